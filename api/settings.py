@@ -58,7 +58,7 @@ class Settings(BaseSettings):
         default_factory=lambda: max(1, min(os.cpu_count() or 1, 8)),
         ge=1,
         le=256,
-        description="processes that answer queries; one more answers previews alone, while all of these work",
+        description="processes that answer queries; one more answers a preview while all of these work on longer questions",
         json_schema_extra={"default": "cores (at most 8)"},
     )
     queue: int = Field(64, ge=0, le=100_000, description="queries that may wait for one; beyond that 503")

@@ -6,6 +6,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from contextvars import ContextVar, copy_context
 from typing import Any
 
@@ -56,40 +57,69 @@ class FairThreads(ThreadPoolExecutor):
     Parameters
     ----------
     count : int
+        Calls at work at once.
     name : str
+    spare : bool
+        Whether one thread more answers a short call while all at work are long ones: what takes milliseconds waits behind nothing that
+        takes seconds.
     """
 
-    def __init__(self, count: int, name: str) -> None:
-        super().__init__(count, name)
+    def __init__(self, count: int, name: str, spare: bool = False) -> None:
+        super().__init__(count + spare, name)
+        self.count, self.spare = count, spare
         self.guard = threading.Lock()
         # in the order in which the groups were served
         self.lines: dict[str, deque[_Waiting]] = {}
         self.working: Counter[str] = Counter()
+        self.long = 0
 
     def submit(self, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        waiting = _Waiting(GROUP.get(), call, arguments, named)
+        return self._line_up(_Waiting(GROUP.get(), call, arguments, named))
+
+    def submit_short(self, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        """Submit a call that takes milliseconds."""
+        return self._line_up(_Waiting(GROUP.get(), call, arguments, named, short=True))
+
+    def _line_up(self, waiting: _Waiting) -> Future[Any]:
         with self.guard:
             self.lines.setdefault(waiting.group, deque()).append(waiting)
         # which call it is is found once a thread is free
-        super().submit(self._next)
+        super().submit(self._work)
         return waiting.answer
 
-    def _next(self) -> None:
+    def _work(self) -> None:
+        """In a thread: answer one call after the other, until none may begin."""
+        while waiting := self._next():
+            try:
+                waiting.carry_out()
+            finally:
+                with self.guard:
+                    self.working[waiting.group] -= 1
+                    self.long -= not waiting.short
+
+    def _next(self) -> _Waiting | None:
         with self.guard:
-            group = min((group for group, line in self.lines.items() if line), key=lambda group: self.working[group], default=None)
-            if group is None:
-                # the end has come between
-                return
+            at_work = self.working.total()
+            aside = self.spare and at_work == self.long == self.count
+            if at_work >= self.count and not aside:
+                # whoever ends next goes on with what waits
+                return None
+            firsts = (next((each for each in line if each.short or not aside), None) for line in self.lines.values())
+            waiting = min((each for each in firsts if each), key=lambda each: self.working[each.group], default=None)
+            if waiting is None:
+                return None
+            group = waiting.group
             line = self.lines.pop(group)
-            waiting = line.popleft()
+            line.remove(waiting)
             if line:
                 self.lines[group] = line
             self.working[group] += 1
-        try:
-            waiting.carry_out()
-        finally:
-            with self.guard:
-                self.working[group] -= 1
+            self.long += not waiting.short
+            if self.spare and self.long == self.count:
+                # short ones that wait may begin now; where the end has come, those at work answer them
+                with suppress(RuntimeError):
+                    super().submit(self._work)
+            return waiting
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         if cancel_futures:
@@ -104,8 +134,10 @@ class FairThreads(ThreadPoolExecutor):
 class _Waiting:
     """A call that waits for a thread."""
 
-    def __init__(self, group: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> None:
-        self.group, self.call, self.arguments, self.named = group, call, arguments, named
+    def __init__(
+        self, group: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any], short: bool = False
+    ) -> None:
+        self.group, self.call, self.arguments, self.named, self.short = group, call, arguments, named, short
         self.answer: Future[Any] = Future()
         # the thread knows for whom it works, and so does what it logs
         self.context = copy_context()

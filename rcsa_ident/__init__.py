@@ -58,6 +58,7 @@ if TYPE_CHECKING:
         read_modes,
         read_result,
         read_tap_tests,
+        ring,
         sample_campaign,
         tap,
     )
@@ -108,6 +109,7 @@ __all__ = [
     "read_tap_tests",
     "read_tip",
     "read_tooling",
+    "ring",
     "rpm",
     "sample_campaign",
     "sample_tooling",
@@ -151,7 +153,7 @@ _ROOMS = {
     "units": ("hz", "rpm"),
     "verbs": (
         "advise", "connect", "estimate_forces", "identify", "listen", "plot_lobes", "read_machine", "read_modes", "read_result",
-        "read_tap_tests", "sample_campaign", "tap",
+        "read_tap_tests", "ring", "sample_campaign", "tap",
     ),
 }  # fmt: skip
 _HOME = {name: f"rcsa_ident.{room}" for room, names in _ROOMS.items() for name in names}

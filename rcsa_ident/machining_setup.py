@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +21,13 @@ from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.tool_holder.drawings import Drawing
-from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.tool_holder.proportions import proportions
+from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
+from rcsa_ident.tool_holder.proportions import cutter_values, proportions
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from rcsa_ident.units import to_rpm
 
-#: Edge forces [N/m] of a cut of which nobody told any, and the standard deviation of their logarithms: the half of a normal distribution
-#: of 10 N/mm that is positive has this median, and about this spread.
-UNTOLD_EDGE, UNTOLD_EDGE_SPREAD = 6.7e3, 0.95
+#: Median of the positive half of a normal distribution over its standard deviation, and about the spread of its logarithm.
+HALF_NORMAL, HALF_NORMAL_SPREAD = 0.67, 0.95
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -45,6 +45,11 @@ class Tooling(Saved):
     tool_model, holder_model : str
         Tools of the same model share what is not known of them, wherever they are clamped; holders of the same model (and bore) share
         their contact. Empty where nothing is shared.
+    taper : str
+        What the holder has behind its flange, one of `rcsa_ident.tool_holder.taper.tapers()`; empty where it is not told. It joins the
+        spindle there, and is part of what hangs on a string.
+    tool_behind : tuple of BeamSegment
+        What the tool has behind the insertion, from there to its rear end: of no account in the holder, part of the bare tool.
 
     Raises
     ------
@@ -58,6 +63,8 @@ class Tooling(Saved):
     spread: Spread = EXACT
     tool_model: str = ""
     holder_model: str = ""
+    taper: str = ""
+    tool_behind: tuple[BeamSegment, ...] = ()
 
     def __post_init__(self) -> None:
         proportions(self.assembly, self.cutter)
@@ -68,6 +75,11 @@ class Tooling(Saved):
         return Drawing(self.assembly, self.spread, self.tool_model, self.holder_model)
 
     @property
+    def whole_tool(self) -> tuple[BeamSegment, ...]:
+        """The tool from its tip to its rear end, as it lies in the drawer."""
+        return (*self.assembly.tool, *self.tool_behind)
+
+    @property
     def remarks(self) -> tuple[Remark, ...]:
         """What is unusual about it, as a wrong unit would make it."""
         return proportions(self.assembly, self.cutter)
@@ -76,12 +88,59 @@ class Tooling(Saved):
         return f"{self.name}: {self.cutter}, {self.assembly}"
 
 
+class BareCutter(Tooling):
+    """A cutter alone, where the tip of the tool that carries it is known by itself: from modes, tap tests or labelled cuts.
+
+    Whoever asks for the tool and its holder is told that there are none.
+
+    Parameters
+    ----------
+    name : str
+    cutter : Cutter
+    """
+
+    def __init__(self, name: str, cutter: Cutter) -> None:
+        fields: dict[str, Any] = {"name": name, "cutter": cutter, "spread": EXACT, "tool_model": "", "holder_model": ""}
+        for field_name, value in fields.items():
+            object.__setattr__(self, field_name, value)
+        tuple(remarks_of(cutter_values(cutter)))  # an impossible one is refused
+
+    def __reduce__(self) -> tuple[type[BareCutter], tuple[str, Cutter]]:
+        """Pickle without the assembly that it has not."""
+        return type(self), (self.name, self.cutter)
+
+    @property
+    def assembly(self) -> ToolAssembly:
+        """Nothing, and a sentence that says so."""
+        raise InputError(
+            f"tooling {self.name}", "[cutter] alone", "tables [tool] and [holder], too: only modes or FRFs of the tip need neither"
+        )
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about the cutter."""
+        return tuple(remarks_of(cutter_values(self.cutter)))
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cutter}"
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Workpiece(Shown):
-    """A material and its cutting coefficients with the campaign's cutters."""
+    """A material and its cutting coefficients with the campaign's cutters.
+
+    Parameters
+    ----------
+    name : str
+    coefficients : CuttingCoefficients
+    edge_force_spread : float [N/m]
+        How large edge forces of which nothing is told may be: they are positive, and as normally distributed. It counts where something
+        of the campaign's drawings is not exact, too.
+    """
 
     name: str
     coefficients: CuttingCoefficients
+    edge_force_spread: float = 10e3
 
     def __str__(self) -> str:
         return f"{self.name}: {self.coefficients}"
@@ -277,6 +336,11 @@ class Campaign(Shown):
         None of hammer tests alone.
     clock_error : float, default 0
         By what share the recorder's clock runs fast: it takes that many more samples in a second than its files say.
+    tests : tuple of HammerTest
+    depth_spread : float [m]
+        Standard deviation of the axial depth, the same in all cuts of a tooling. It counts where something of the drawings is not exact.
+    softening_spread : float [-]
+        Standard deviation of the stiffness' change from the middle to the end of the speeds, as a share.
     """
 
     name: str
@@ -287,10 +351,12 @@ class Campaign(Shown):
     cuts: tuple[Cut, ...]
     clock_error: float = 0.0
     tests: tuple[HammerTest, ...] = ()
+    depth_spread: float = 0.02e-3
+    softening_spread: float = 0.03
 
     @property
     def coefficients(self) -> CuttingCoefficients:
-        """The workpiece's cutting coefficients.
+        """The workpiece's cutting coefficients, with the edge forces that are to be expected where nothing is told of any.
 
         Raises
         ------
@@ -299,10 +365,10 @@ class Campaign(Shown):
         """
         if self.workpiece is None:
             raise InputError("workpiece", "nothing", "a table [workpiece] in the campaign of cuts")
-        told = self.workpiece.coefficients
-        if not self.rough or told.tangential_edge or told.radial_edge:
+        told, edge = self.workpiece.coefficients, HALF_NORMAL * self.workpiece.edge_force_spread
+        if not self.rough or told.tangential_edge or told.radial_edge or edge == 0.0:
             return told
-        return replace(told, tangential_edge=UNTOLD_EDGE, radial_edge=UNTOLD_EDGE, edge_spread=UNTOLD_EDGE_SPREAD)
+        return replace(told, tangential_edge=edge, radial_edge=edge, edge_spread=HALF_NORMAL_SPREAD)
 
     @property
     def rough(self) -> bool:

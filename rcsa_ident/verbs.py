@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.identification.machine import IdentifiedMachine
+    from rcsa_ident.identification.ringing import RungTooling
     from rcsa_ident.identified import Result
     from rcsa_ident.machine.machine import Machine, TipSource
     from rcsa_ident.observer.tuning import ObserverMethod
@@ -369,6 +370,35 @@ def tap(
     opened = [open_recording(path, [name for name in (force, response) if name], rate) for path in recordings]
     with _one_thread():
         return tap_recordings(opened, force, response, quantity, HitEstimator(estimator), sensor_mass, axis)[0]
+
+
+def ring(
+    tooling: Tooling | str | Path,
+    *sounds: str | Path,
+    bare_tool: Sequence[str | Path] = (),
+    mass: float | None = None,
+    rate: float | None = None,
+) -> RungTooling:
+    """Return a tooling learned from how it rings: hung on a string, tapped, and recorded with a phone beside it.
+
+    Parameters
+    ----------
+    tooling : Tooling or path
+    *sounds : path
+        Of the tool in its holder, one with several hits, or several files.
+    bare_tool, mass : sequence of path, float [kg]
+        Of the tool alone.
+    rate : float, optional [Hz]
+        Of files that tell none.
+    """
+    from rcsa_ident.io.open_recording import open_recording
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.ring import ring_tooling
+
+    tooling = tooling if isinstance(tooling, Tooling) else read_tooling(tooling)
+    heard, alone = ([open_recording(path, (), rate) for path in paths] for paths in (sounds, bare_tool))
+    with _one_thread():
+        return ring_tooling(tooling, heard, alone, mass)
 
 
 def plot_lobes(lobes: StabilityLobes, **options: Any) -> Figure:

@@ -165,7 +165,7 @@ class Uploads(Asking):
             return read(UploadAnswer, self.send("POST", path, files=parts, params=params, **self.long_timeout))
 
     def upload_folder(self, machine: str, folder: Path, report: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
-        """Upload the folder of a campaign: campaign.toml, its toolings and all recordings.
+        """Upload the folder of a campaign: campaign.toml, its toolings, all recordings and the files of its hammer tests.
 
         Parameters
         ----------
@@ -176,8 +176,8 @@ class Uploads(Asking):
         toolings = {name: read_toml(folder / path, "tooling") for name, path in data["toolings"].items()}
         campaign = self.make_campaign(machine, {**data, "toolings": toolings})
         # air cuts first: each cut is then judged once
-        paths = dict.fromkeys(cut[key] for key in ("air", "cut") for cut in data["cuts"] if key in cut)
-        for path in paths:
+        paths = dict.fromkeys(cut[key] for key in ("air", "cut") for cut in data.get("cuts", ()) if key in cut)
+        for path in paths | dict.fromkeys(test["file"] for test in data.get("frfs", ())):
             answer = self.upload(campaign.id, folder / path)
             if report is not None:
                 report(answer)

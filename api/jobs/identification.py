@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,15 +29,16 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.task import Task
 from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.results import check_result, layout, plain
-from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, among_fellows
-from rcsa_ident.signals.recording import Recording
 from rcsa_ident.units import to_hz
-from rcsa_ident.workflows.identify import ReadCut, data_of, judge_cut, left_out, mode_deviations, of_campaign
+from rcsa_ident.workflows.identify import ReadCut, ReadTest, data_of, hammer_lines, judge_cut, left_out, mode_deviations, of_campaign
 
-#: Returns a campaign of a group and what reads its cuts.
-Load = Callable[[str, str], tuple[Campaign, ReadCut]]
+#: Returns a campaign of a group, what reads its cuts and what reads its hammer tests.
+Load = Callable[[str, str], tuple[Campaign, ReadCut, ReadTest]]
+_T = TypeVar("_T")
+_R = TypeVar("_R")
 #: Cuts that are judged in one step, and points of a curve.
 CHUNK, POINTS = 4, 300
 
@@ -56,15 +57,15 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     Raises
     ------
     InputError
-        The campaign is gone or has changed, or none of its cuts is usable.
+        The campaign is gone or has changed, or none of its cuts is usable and there is no hammer test.
     """
     request = json.loads(whole(job.request, job.request_digest, f"request of the job {job.id}", "ask for the job once more"))
     start = context.jobs.text(job.id, "start")
-    campaign, read = load(job.group, str(job.campaign))
-    plan = context.remember("plan", lambda: [_files(cut) for cut in campaign.cuts])
+    campaign, read, read_test = load(job.group, str(job.campaign))
+    plan = context.remember("plan", lambda: [_files(each) for each in _parts(campaign)])
     campaign = _planned(campaign, plan)
     readings = _readings(campaign, read, context)
-    data = data_of(campaign, readings)
+    data = data_of(campaign, readings, hammer_lines(campaign, _anonymous(read_test)))
     story = _Story(context, Preview(data), datetime.fromisoformat(str(job.started)))
     found = of_campaign(_method(request["method"], start).run(data, request["seed"], _Remembering(context, spread), story), campaign)
     context.progress("result", 0, 1)
@@ -80,35 +81,39 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     return Outcome("done", "", status=str(found.status), texts=texts, applied=applied, problem=problem)
 
 
-def _files(cut: Cut) -> list[str]:
-    """What a cut is read from: the names say what is in the files."""
-    return [cut.id, cut.recording.name, "" if cut.air is None else cut.air.name]
+def _parts(campaign: Campaign) -> list[Cut | HammerTest]:
+    return [*campaign.cuts, *campaign.tests]
+
+
+def _files(each: Cut | HammerTest) -> list[str]:
+    """What a cut or a hammer test is read from: the names say what is in the files."""
+    if isinstance(each, HammerTest):
+        return [each.id, each.file.name, ""]
+    return [each.id, each.recording.name, "" if each.air is None else each.air.name]
 
 
 def _planned(campaign: Campaign, plan: list[list[str]]) -> Campaign:
     """The campaign as it was when the job began: what has been uploaded since then belongs to the next one."""
-    there = {cut.id: cut for cut in campaign.cuts}
-    cuts = []
+    there = {each.id: each for each in _parts(campaign)}
+    cuts: list[Cut] = []
+    tests: list[HammerTest] = []
     for id, recording, air in plan:
         if id not in there or _files(there[id])[1] != recording:
             raise InputError(
                 "campaign", f"another recording of {id}, or none, since the job began", "recordings that stay while a job runs"
             )
-        cuts.append(there[id] if air else replace(there[id], air=None))
-    return replace(campaign, cuts=tuple(cuts))
+        each = there[id]
+        if isinstance(each, HammerTest):
+            tests.append(each)
+        else:
+            cuts.append(each if air else replace(each, air=None))
+    return replace(campaign, cuts=tuple(cuts), tests=tuple(tests))
 
 
 def _readings(campaign: Campaign, read: ReadCut, context: JobContext) -> list[Reading]:
     def reading(cut: Cut) -> Reading:
         context.check()
-        return judge_cut(campaign, anonymous, cut)
-
-    def anonymous(cut: Cut) -> tuple[Recording, Recording | None]:
-        try:
-            return read(cut)
-        except InputError as error:
-            # where the service keeps its files is nobody's business
-            raise InputError(error.field, error.found, error.allowed) from None
+        return judge_cut(campaign, _anonymous(read), cut)
 
     readings: list[Reading] = []
     for first in range(0, len(campaign.cuts), CHUNK):
@@ -117,6 +122,18 @@ def _readings(campaign: Campaign, read: ReadCut, context: JobContext) -> list[Re
         readings += context.remember(f"recordings.{first}", partial(_all, reading, cuts))
     context.progress("recordings", len(campaign.cuts), len(campaign.cuts))
     return among_fellows(readings)
+
+
+def _anonymous(read: Callable[[_T], _R]) -> Callable[[_T], _R]:
+    """What reads the same, but does not tell where the service keeps its files."""
+
+    def reading(each: _T) -> _R:
+        try:
+            return read(each)
+        except InputError as error:
+            raise InputError(error.field, error.found, error.allowed) from None
+
+    return reading
 
 
 def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading]:

@@ -19,11 +19,13 @@ from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Campaign, Tooling
 
+#: Role of a file that holds FRFs of hammer tests.
+HAMMER = "hammer"
 #: Suffixes of recordings in lower case.
 FORMATS = tuple(READERS)
 #: Largest text of a campaign, and of its toolings together [characters].
 LARGEST, LARGEST_TOOLINGS = 1_000_000, 4_000_000
-MOST_CUTS, MOST_SENSORS, MOST_TOOLINGS = 2000, 64, 200
+MOST_CUTS, MOST_TESTS, MOST_SENSORS, MOST_TOOLINGS = 2000, 200, 64, 200
 #: Frequency up to which the cost of toolings is estimated [Hz].
 HIGHEST_HZ = 5000.0
 TOOLING_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._+()-]{0,63}")
@@ -36,14 +38,14 @@ Library = Callable[[str], str | None]
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A recording that a campaign names.
+    """A file that a campaign names.
 
     Parameters
     ----------
     role : str
-        cut or air.
+        cut, air or hammer.
     cuts : tuple of str
-        Ids of the cuts that it serves.
+        Ids of the cuts, or of the hammer tests, that it serves.
     """
 
     role: str
@@ -88,20 +90,20 @@ def declare(data: Mapping[str, Any], library: Library) -> tuple[str, str, int]:
     InputError
         Names the key, what was found and what is allowed.
     """
-    for key, most in (("sensors", MOST_SENSORS), ("cuts", MOST_CUTS), ("toolings", MOST_TOOLINGS)):
+    for key, most in (("sensors", MOST_SENSORS), ("cuts", MOST_CUTS), ("frfs", MOST_TESTS), ("toolings", MOST_TOOLINGS)):
         if isinstance(data.get(key), Mapping | list) and len(data[key]) > most:
             raise InputError(key, f"{len(data[key])} of them", f"at most {most}")
-    if "frfs" in data:
-        allowed = "a campaign of cuts: the service does not take hammer tests yet, rcsa-ident identify and the Python package do"
-        raise InputError("frfs", "hammer tests", allowed)
     top = Table(data, "")
-    cuts = _cuts(top)
-    plain = {**data, "toolings": _toolings(top, cuts, library), "cuts": cuts}
+    cuts, tests = _cuts(top), _tests(top)
+    plain = {"sensors": {}, **data, "toolings": _toolings(top, [*cuts, *tests], library), "cuts": cuts}
+    if tests:
+        plain["frfs"] = tests
     campaign = _campaign(plain, lambda name: Path(name))
     for tooling in campaign.toolings.values():
         weigh(tooling.assembly, HIGHEST_HZ)
-    _check_files(plain["cuts"])
+    _check_files(cuts, tests)
     lines = {"campaign.name": campaign.name} | {f"cuts[{i}].id": cut.id for i, cut in enumerate(campaign.cuts)}
+    lines |= {f"frfs[{i}].id": test.id for i, test in enumerate(campaign.tests)}
     for field, text in lines.items():
         if len(text) > 200 or not text.isprintable():
             raise InputError(field, repr(text[:80]), "a line of at most 200 characters")
@@ -110,17 +112,35 @@ def declare(data: Mapping[str, Any], library: Library) -> tuple[str, str, int]:
 
 def _cuts(top: Table) -> list[dict[str, Any]]:
     """Cuts with the last parts of their recordings' paths."""
-    cuts = [dict(table.data) for table in top.tables("cuts")]
+    cuts = [dict(table.data) for table in top.tables("cuts")] if "cuts" in top else []
     paths: dict[str, str] = {}
     for i, cut in enumerate(cuts):
         for key in ("cut", "air"):
             text = cut.get(key)
             if not isinstance(text, str):
                 continue
-            cut[key] = name = _checked_name(f"cuts[{i}].{key}", text)
-            if paths.setdefault(name, text) != text:
-                raise InputError(f"cuts[{i}].{key}", f'"{text}" beside "{paths[name]}"', "file names (last parts of the paths) that differ")
+            cut[key] = _last_part(f"cuts[{i}].{key}", text, paths)
+            if PurePosixPath(cut[key]).suffix.lower() not in FORMATS:
+                raise InputError(f"cuts[{i}].{key}", repr(text[-80:]), f"a file name that ends in one of {', '.join(FORMATS)}")
     return cuts
+
+
+def _tests(top: Table) -> list[dict[str, Any]]:
+    """Hammer tests with the last parts of their files' paths; a file's content says what it is, not its suffix."""
+    tests = [dict(table.data) for table in top.tables("frfs")] if "frfs" in top else []
+    paths: dict[str, str] = {}
+    for i, test in enumerate(tests):
+        if isinstance(text := test.get("file"), str):
+            test["file"] = _last_part(f"frfs[{i}].file", text, paths)
+    return tests
+
+
+def _last_part(field: str, text: str, paths: dict[str, str]) -> str:
+    """The name of a file; `paths` are those seen so far by their names."""
+    name = _checked_name(field, text)
+    if paths.setdefault(name, text) != text:
+        raise InputError(field, f'"{text}" beside "{paths[name]}"', "file names (last parts of the paths) that differ")
+    return name
 
 
 def _checked_name(field: str, text: str) -> str:
@@ -129,13 +149,11 @@ def _checked_name(field: str, text: str) -> str:
     odd = not name.isprintable() or _FORBIDDEN & set(name) or name.startswith(".") or name != name.strip()
     if odd or not 1 <= len(name) <= _LONGEST_NAME:
         raise InputError(field, repr(text[:80]), allowed)
-    if PurePosixPath(name).suffix.lower() not in FORMATS:
-        raise InputError(field, repr(text[-80:]), f"a file name that ends in one of {', '.join(FORMATS)}")
     return name
 
 
-def _check_files(cuts: list[dict[str, Any]]) -> None:
-    """Refuse a file that serves two cuts, or a cut and an air cut."""
+def _check_files(cuts: list[dict[str, Any]], tests: list[dict[str, Any]]) -> None:
+    """Refuse a file that serves two cuts, a cut and an air cut, or a hammer test and a cut."""
     owner: dict[str, int] = {}
     for i, cut in enumerate(cuts):
         if cut["cut"] in owner:
@@ -144,14 +162,18 @@ def _check_files(cuts: list[dict[str, Any]]) -> None:
     for i, cut in enumerate(cuts):
         if cut.get("air") in owner:
             raise InputError(f"cuts[{i}].air", f'"{cut["air"]}", which is the file of a cut', "a recording without cutting")
+    recordings = {*owner, *(cut["air"] for cut in cuts if "air" in cut)}
+    for i, test in enumerate(tests):
+        if test["file"] in recordings:
+            raise InputError(f"frfs[{i}].file", f'"{test["file"]}", which is a recording of [[cuts]]', "the file of an FRF")
 
 
-def _toolings(top: Table, cuts: list[dict[str, Any]], library: Library) -> dict[str, str]:
-    """Texts of all toolings by name."""
+def _toolings(top: Table, users: list[dict[str, Any]], library: Library) -> dict[str, str]:
+    """Texts of all toolings by name; without the table of those that cuts and hammer tests use."""
     if "toolings" in top:
         given = dict(top.table("toolings").data)
     else:
-        names = dict.fromkeys(name for cut in cuts if isinstance(name := cut.get("tooling"), str))
+        names = dict.fromkeys(name for user in users if isinstance(name := user.get("tooling"), str))
         given = {name: name for name in names}
     texts: dict[str, str] = {}
     for key, what in given.items():
@@ -189,7 +211,8 @@ def _campaign(plain: Mapping[str, Any], locate: Callable[[str], Path]) -> Campai
     def file(table: Table, key: str) -> Path:
         return locate(table.text(key, allowed="the name of a recording"))
 
-    return campaign_of(plain, "", "campaign", tooling, file)
+    # hammer tests alone have no table [[cuts]]
+    return campaign_of({key: what for key, what in plain.items() if key != "cuts" or what}, "", "campaign", tooling, file)
 
 
 def campaign_of_text(text: str, locate: Callable[[str], Path] = Path) -> Campaign:
@@ -198,13 +221,17 @@ def campaign_of_text(text: str, locate: Callable[[str], Path] = Path) -> Campaig
 
 
 def files_of(text: str) -> dict[str, File]:
-    """Return the recordings that a campaign names, in its order."""
+    """Return the files that a campaign names, in its order: recordings, then those of hammer tests."""
     found: dict[str, File] = {}
-    for cut in json.loads(text)["cuts"]:
+    data = json.loads(text)
+    for cut in data["cuts"]:
         found[cut["cut"]] = File("cut", (cut["id"],))
         if "air" in cut:
             served = found[cut["air"]].cuts if cut["air"] in found else ()
             found[cut["air"]] = File("air", (*served, cut["id"]))
+    for test in data.get("frfs", ()):
+        served = found[test["file"]].cuts if test["file"] in found else ()
+        found[test["file"]] = File(HAMMER, (*served, test["id"]))
     return found
 
 
@@ -214,7 +241,7 @@ def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
     Parameters
     ----------
     there : callable
-        Whether the folder holds a recording; cuts without one are omitted.
+        Whether the folder holds a file; cuts and hammer tests without theirs are omitted.
     """
     data = json.loads(text)
     for cut in (cuts := [cut for cut in data["cuts"] if there(cut["cut"])]):
@@ -222,4 +249,7 @@ def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
             del cut["air"]
         for key in {"cut", "air"} & cut.keys():
             cut[key] = f"recordings/{cut[key]}"
-    return toml_of(data | {"toolings": {name: f"toolings/{name}.toml" for name in data["toolings"]}, "cuts": cuts})
+    tests = [test | {"file": f"recordings/{test['file']}"} for test in data.get("frfs", ()) if there(test["file"])]
+    told = data | {"toolings": {name: f"toolings/{name}.toml" for name in data["toolings"]}, "cuts": cuts, "frfs": tests}
+    # of hammer tests alone nothing is said of cuts and sensors
+    return toml_of({key: what for key, what in told.items() if what or key not in ("cuts", "frfs", "sensors")})

@@ -11,20 +11,22 @@ from api.files import NORMALISED, Files
 from api.reading.campaign_text import campaign_of_text
 from api.reading.stored import Samples
 from api.stores.entities import Store
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.signals.recording import Recording
 
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
+ReadTest = Callable[[HammerTest], tuple[FloatArray, ComplexArray]]
 
 
-def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> tuple[Campaign, ReadCut]:
-    """Return a campaign with the cuts that have recordings, and a picklable function that reads them.
+def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> tuple[Campaign, ReadCut, ReadTest]:
+    """Return a campaign with the cuts and hammer tests that have files, and picklable functions that read them.
 
     Raises
     ------
     InputError
-        The campaign has been deleted, or none of its cuts has a recording.
+        The campaign has been deleted, or none of its cuts and hammer tests has a file.
     """
     row = store.campaigns.get(group, campaign_id)
     if row is None:
@@ -38,10 +40,11 @@ def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> t
 
     found = campaign_of_text(row.text, locate)
     there = [cut for cut in found.cuts if cut.recording != Path()]
-    if not there:
+    tests = tuple(test for test in found.tests if test.file != Path())
+    if not there and not tests:
         raise InputError("campaign", "no recording of a cut", "a campaign with recordings")
     cuts = tuple(replace(cut, air=None) if cut.air == Path() else cut for cut in there)
-    return replace(found, cuts=cuts), partial(_read_whole, samples)
+    return replace(found, cuts=cuts, tests=tests), partial(_read_whole, samples), partial(_read_test, samples)
 
 
 def _read_whole(samples: Samples, cut: Cut) -> tuple[Recording, Recording | None]:
@@ -51,3 +54,10 @@ def _read_whole(samples: Samples, cut: Cut) -> tuple[Recording, Recording | None
         if path is not None:
             samples.check(path)
     return read_cut_normalised(cut)
+
+
+def _read_test(samples: Samples, test: HammerTest) -> tuple[FloatArray, ComplexArray]:
+    from api.reading.hammer_files import read_stored
+
+    samples.check(test.file)
+    return read_stored(test)

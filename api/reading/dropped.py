@@ -52,7 +52,7 @@ class Dropped:
     from_library, missing : list of str
         Toolings of the campaign that are not among the files: the library's, and those that it lacks.
     recordings : list of str
-        Names of the recordings that the campaign wants.
+        Names of the recordings and hammer tests' files that the campaign wants.
     others : list of str
         Files that are neither campaign nor tooling.
     """
@@ -88,7 +88,7 @@ def look_at(files: Sequence[tuple[str, str]], library: Library) -> Dropped:
     for name, text in files:
         with _naming(name):
             keys = keys_of_toml(text, "file")
-        if "cuts" in keys or "campaign" in keys:
+        if {"cuts", "campaign", "frfs"} & keys.keys():
             if found.campaign is not None:
                 raise InputError(name, "a second campaign", f"one campaign at a time, as {found.campaign}")
             found.campaign, found.keys = name, keys
@@ -123,11 +123,11 @@ def look_at(files: Sequence[tuple[str, str]], library: Library) -> Dropped:
 
 
 def _wanted(keys: Mapping[str, Any]) -> dict[str, str]:
-    """Keys of [toolings] with what each names; without the table the names that the cuts use."""
+    """Keys of [toolings] with what each names; without the table the names that cuts and hammer tests use."""
     given = keys.get("toolings")
     if isinstance(given, Mapping):
         return {key: what for key, what in given.items() if isinstance(what, str) and "\n" not in what}
-    return {name: name for cut in _cuts(keys) if isinstance(name := cut.get("tooling"), str)}
+    return {name: name for each in (*_tables(keys, "cuts"), *_tables(keys, "frfs")) if isinstance(name := each.get("tooling"), str)}
 
 
 def _names(wanted: Mapping[str, str]) -> list[str]:
@@ -135,13 +135,14 @@ def _names(wanted: Mapping[str, str]) -> list[str]:
     return list(dict.fromkeys(key if what.endswith(".toml") else what for key, what in wanted.items()))
 
 
-def _cuts(keys: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    cuts = keys.get("cuts")
-    return [cut for cut in cuts if isinstance(cut, Mapping)] if isinstance(cuts, list) else []
+def _tables(keys: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
+    tables = keys.get(name)
+    return [each for each in tables if isinstance(each, Mapping)] if isinstance(tables, list) else []
 
 
 def _recordings(keys: Mapping[str, Any]) -> list[str]:
-    paths = (cut.get(key) for cut in _cuts(keys) for key in ("cut", "air"))
+    paths = [cut.get(key) for cut in _tables(keys, "cuts") for key in ("cut", "air")]
+    paths += [test.get("file") for test in _tables(keys, "frfs")]
     return list(dict.fromkeys(recording_name(path) for path in paths if isinstance(path, str)))
 
 

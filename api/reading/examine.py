@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,9 @@ from rcsa_ident.signals.sweep import judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.units import to_rpm
 from rcsa_ident.workflows.identify import read_of
+
+#: A campaign's files come one after the other, each with its whole text.
+_declared = lru_cache(4)(campaign_of_text)
 
 
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
@@ -59,7 +63,7 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     air : Path or None
         Samples of the cut's air cut, where they have been uploaded.
     """
-    campaign = campaign_of_text(text)
+    campaign = _declared(text)
     cut = next(each for each in campaign.cuts if each.id == cut_id)
     recording = read_upload(upload, campaign.sensors, campaign.sampling_rate)
     try:
@@ -78,10 +82,10 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
 
 def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
     """Return the verdict on the stored samples of a cut."""
-    campaign = campaign_of_text(text)
-    declared = next(each for each in campaign.cuts if each.id == cut_id)
+    campaign = _declared(text)
+    own = next(each for each in campaign.cuts if each.id == cut_id)
     beside = None if air is None else read_normalised(air, in_file=True)
-    return judged(campaign, declared, read_normalised(cut, in_file=True), beside, "cut")[0]
+    return judged(campaign, own, read_normalised(cut, in_file=True), beside, "cut")[0]
 
 
 def among_fellows(toolings: list[str], alone: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from rcsa_ident.signals.recording import Sensor
 
 def warm() -> None:
     """Import and compile what a verdict needs, see `examine.warm`, and what listening does."""
-    from api.reading import examine, hearing
+    from api.reading import examine, hammer_files, hearing  # noqa: F401, what is imported once is there
 
     examine.warm()
     hearing.warm()
@@ -22,6 +22,13 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     from api.reading import examine
 
     return examine.look(upload, text, cut_id, role, air)
+
+
+def look_at_hammer_tests(upload: Upload, text: str) -> dict[str, Any]:
+    """Return what the FRFs of a campaign's hammer tests are, see `hammer_files.look`."""
+    from api.reading import hammer_files
+
+    return hammer_files.look(upload, text)
 
 
 def read_alone(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> dict[str, Any]:

@@ -73,9 +73,9 @@ def read_normalised(path: str | Path, in_file: bool = False) -> Recording:
     InputError
         The file is missing or damaged.
     """
-    sensors = _sensors(Path(path))
+    sensors, notes = _about(Path(path))
     rate, signals = read_signals(path, [f"{i}" for i in range(len(sensors))], suffix=".h5")
-    return (recorded if in_file else in_si)(rate, Signals(signals, _notes(Path(path))), sensors)
+    return (recorded if in_file else in_si)(rate, Signals(signals, notes), sensors)
 
 
 def read_cut_normalised(cut: Cut) -> tuple[Recording, Recording | None]:
@@ -85,7 +85,7 @@ def read_cut_normalised(cut: Cut) -> tuple[Recording, Recording | None]:
 
 def blocks(path: Path, samples: int) -> Iterator[tuple[int, Recording]]:
     """Yield the first index and the recording of successive parts of so many samples."""
-    sensors = _sensors(path)
+    sensors, _ = _about(path)
     with h5py.File(path, "r", locking=False) as file:
         rate, datasets = float(file.attrs[RATE]), [file[f"{i}"] for i in range(len(sensors))]
         for start in range(0, datasets[0].size, samples):
@@ -98,18 +98,14 @@ def length(path: Path) -> tuple[float, int]:
         return float(file.attrs[RATE]), int(file["0"].size)
 
 
-def _sensors(path: Path) -> tuple[Sensor, ...]:
+def _about(path: Path) -> tuple[tuple[Sensor, ...], tuple[Remark, ...]]:
+    """Sensors, and what the reader said of the upload; samples of an earlier release carry no notes."""
     try:
         with h5py.File(path, "r", locking=False) as file:
-            return tuple(_sensor(each) for each in json.loads(file.attrs[_SENSORS]))
+            notes = json.loads(file.attrs.get(_NOTES, "[]"))
+            return tuple(map(_sensor, json.loads(file.attrs[_SENSORS]))), tuple(Remark(RecordCode(code), words) for code, words in notes)
     except (OSError, KeyError, ValueError):
         raise InputError("recording", "samples that are missing or damaged", "an uploaded recording") from None
-
-
-def _notes(path: Path) -> tuple[Remark, ...]:
-    """What the reader said of the upload; samples of an earlier release carry none."""
-    with h5py.File(path, "r", locking=False) as file:
-        return tuple(Remark(RecordCode(code), words) for code, words in json.loads(file.attrs.get(_NOTES, "[]")))
 
 
 def _sensor(data: dict[str, Any]) -> Sensor:

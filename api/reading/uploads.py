@@ -16,7 +16,7 @@ from typing import Any
 
 from api.files import NORMALISED, UPLOADS, Files, Full, Partial, sha256_of
 from api.reading import reader_tasks
-from api.reading.campaign_text import Upload, files_of
+from api.reading.campaign_text import HAMMER, Upload, files_of
 from api.reading.stored import found_of, is_judged, is_whole, samples_of
 from api.shares import Shares
 from api.stores.campaigns import Campaign, FileKey, Recording
@@ -140,8 +140,11 @@ class Uploads:
         target = self.files.spare(campaign.group)
         try:
             upload = Upload(received.path, name, target)
-            there = await asyncio.to_thread(self._samples, air)
-            found = await self.reader.run(reader_tasks.look, upload, campaign.text, cut, role, there)
+            if role == HAMMER:
+                found = await self.reader.run(reader_tasks.look_at_hammer_tests, upload, campaign.text)
+            else:
+                there = await asyncio.to_thread(self._samples, air)
+                found = await self.reader.run(reader_tasks.look, upload, campaign.text, cut, role, there)
             recording = Recording(
                 campaign.group,
                 campaign.id,
@@ -332,7 +335,9 @@ def partial_name(campaign: str, name: str) -> str:
 def normalised_key(text: str, name: str, sha256: str) -> str:
     """Return the key of the samples of an upload: a hash of its content and of everything in the campaign that decides how it is read."""
     data = json.loads(text)
+    tests = [test for test in data.get("frfs", ()) if test["file"] == name]
     basis = [_FORM, sha256, Path(name).suffix.lower(), data["sensors"], data.get("campaign", {}).get("sampling_rate_hz")]
+    basis = [_FORM, sha256, HAMMER, tests] if tests else basis
     return hashlib.sha256(json.dumps(basis, sort_keys=False).encode()).hexdigest()
 
 

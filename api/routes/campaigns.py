@@ -16,10 +16,19 @@ from api.components import Components, ThisService
 from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, in_use, page, problems, utf8
 from api.lookups import known_campaign, machine_of
 from api.problems import Problem
-from api.reading.campaign_text import LARGEST, campaign_of_text, declare, files_of, toml_text
+from api.reading.campaign_text import HAMMER, LARGEST, campaign_of_text, declare, files_of, toml_text
 from api.reading.stored import found_of, upload_of
 from api.reading.uploads import refused_verdict
-from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
+from api.schemas.campaigns import (
+    EXAMPLE,
+    CampaignAnswer,
+    CampaignSummary,
+    CutAnswer,
+    FileState,
+    HammerTestAnswer,
+    NewCampaign,
+    VerdictAnswer,
+)
 from api.schemas.common import Page, body_of
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.campaigns import Campaign, Counts, Recording
@@ -91,9 +100,11 @@ def list_campaigns(id: MachineId, components: ThisService, caller: WhoAsks, afte
     for row in rows:
         count = counts.get(row.id, Counts(0, 0))
         common = {name: getattr(row, name) for name in ("id", "machine", "name", "created", "cuts")}
-        missing = len(files_of(row.text)) - count.uploaded - count.air
-        without = sum("air" not in cut for cut in json.loads(row.text)["cuts"])
-        items.append(CampaignSummary(**common, uploaded=count.uploaded, usable=count.usable, missing=missing, without_air=without))
+        missing = len(files_of(row.text)) - count.uploaded - count.air - count.hammer
+        data = json.loads(row.text)
+        without, tests = sum("air" not in cut for cut in data["cuts"]), len(data.get("frfs", ()))
+        uploaded, usable = count.uploaded, count.usable
+        items.append(CampaignSummary(**common, uploaded=uploaded, usable=usable, missing=missing, without_air=without, hammer_tests=tests))
     return Page(items=items, next=following)
 
 
@@ -118,7 +129,7 @@ def get(id: CampaignId, request: Request, components: ThisService, caller: WhoAs
 @router.get(
     "/campaigns/{id}/archive",
     summary="ZIP archive for `rcsa-ident identify`: campaign.toml, toolings and the original recordings",
-    description="Cuts without a recording are omitted.",
+    description="Cuts and hammer tests without their files are omitted.",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={
@@ -129,7 +140,7 @@ def get(id: CampaignId, request: Request, components: ThisService, caller: WhoAs
 def archive(id: CampaignId, components: ThisService, caller: WhoAsks) -> StreamingResponse:
     campaign = known_campaign(components, caller.group, id)
     rows = {row.name: row for row in components.store.recordings.list(caller.group, id, "", 1_000_000)}
-    if not any(row.role == "cut" for row in rows.values()):
+    if not any(row.role in ("cut", HAMMER) for row in rows.values()):
         raise Problem(409, "no recording of a cut has been uploaded yet")
     # before the first byte: of an archive that breaks off nobody knows why
     files = {name: upload_of(components.files, row) for name, row in rows.items()}
@@ -154,6 +165,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
     data = json.loads(campaign.text)
     rows = {row.name: row for row in components.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
+    tests = [_hammer_test(test, rows) for test in data.get("frfs", ())]
     usable = [(cut.tooling, cut.verdict.windows) for cut in cuts if cut.verdict is not None and cut.verdict.usable]
     return CampaignAnswer(
         id=campaign.id,
@@ -162,12 +174,14 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         created=campaign.created,
         sampling_rate_hz=data.get("campaign", {}).get("sampling_rate_hz"),
         sensors=data["sensors"],
-        workpiece=data["workpiece"],
+        workpiece=data.get("workpiece", {}),
         toolings=list(data["toolings"]),
         usable=len(usable),
         remarks=_remarks(campaign),
-        too_few=too_few((tooling for tooling, windows in usable for _ in range(windows)), _sees_flange(data["sensors"])),
+        # hammer tests help, and tell by their spreads what they leave open
+        too_few=None if tests else too_few((tooling for tooling, windows in usable for _ in range(windows)), _sees_flange(data["sensors"])),
         cuts=cuts,
+        hammer_tests=tests,
     )
 
 
@@ -199,6 +213,15 @@ def _cut(cut: dict[str, Any], rows: dict[str, Recording]) -> CutAnswer:
         "air": None if air is None else FileState(name=air, uploaded=air in rows),
     }
     return CutAnswer(**cut | files, verdict=verdict)
+
+
+def _hammer_test(test: dict[str, Any], rows: dict[str, Recording]) -> HammerTestAnswer:
+    row, told = rows.get(test["file"]), {key: test[key] for key in ("id", "tooling", "axis", "response", "force")}
+    try:
+        found = {} if row is None else {each["id"]: each["lines"] for each in found_of(row)["frfs"]}
+    except Damaged:
+        found = {}
+    return HammerTestAnswer(**told, file=FileState(name=test["file"], uploaded=row is not None), lines=found.get(test["id"]))
 
 
 def _members(campaign: Campaign, files: Mapping[str, FilePath]) -> Iterator[tuple[str, bytes | FilePath]]:

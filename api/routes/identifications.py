@@ -42,8 +42,10 @@ _Of = Annotated[str | None, Query(pattern=ID_PATTERN)]
 def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
     campaign = known_campaign(components, caller.group, body.campaign)
     counts = components.store.campaigns.counts(caller.group, [campaign.id]).get(campaign.id)
-    if counts is None or counts.uploaded == 0:
+    if counts is None or counts.uploaded + counts.hammer == 0:
         raise InputError("campaign", f"no recording of its {campaign.cuts} cuts", "a campaign with recordings")
+    if counts.hammer and body.method == "paper":
+        raise InputError("method", "paper with hammer tests", "the default method, which takes them")
     texts = {}
     if body.start:
         if body.method == "paper":

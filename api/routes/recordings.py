@@ -14,7 +14,7 @@ from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, 
 from api.lookups import known_campaign
 from api.problems import Problem
 from api.reading import reader_tasks
-from api.reading.campaign_text import File, files_of
+from api.reading.campaign_text import HAMMER, File, files_of
 from api.reading.stored import found_of, samples_of, upload_of
 from api.reading.uploads import Received
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
@@ -34,6 +34,7 @@ from api.transfer.body_stream import (
     storage_problems,
 )
 from api.transfer.parts_of_file import PartsOfFile
+from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"
@@ -136,7 +137,7 @@ def file(id: CampaignId, name: RecordingName, request: Request, components: This
 async def spectrum(
     id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks, points: Points = 2000
 ) -> SpectrumAnswer:
-    _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
+    row = await run_in_threadpool(_over_time, components, caller.group, id, name)
     path = await run_in_threadpool(samples_of, components.files, row)
     speed = found_of(row)["spindle_speed_rpm"]
     return SpectrumAnswer.model_validate(await while_there(request, components.work.run(reader_tasks.spectrum, path, speed, points)))
@@ -146,7 +147,7 @@ async def spectrum(
 async def signal(
     id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks, points: Points = 1000
 ) -> SignalAnswer:
-    _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
+    row = await run_in_threadpool(_over_time, components, caller.group, id, name)
     path = await run_in_threadpool(samples_of, components.files, row)
     return SignalAnswer.model_validate(await while_there(request, components.work.run(reader_tasks.envelope, path, points)))
 
@@ -181,6 +182,13 @@ def named(components: Components, group: str, id: str, name: str) -> tuple[Campa
 def _kept(components: Components, group: str, id: str, name: str) -> tuple[Campaign, Recording]:
     campaign = known_campaign(components, group, id)
     return campaign, found_or_404(components.store.recordings.get(group, id, _form(name)), "recording")
+
+
+def _over_time(components: Components, group: str, id: str, name: str) -> Recording:
+    _, row = _kept(components, group, id, name)
+    if row.role == HAMMER:
+        raise InputError("name", f"{row.name}, which holds FRFs of hammer tests", "a recording over time")
+    return row
 
 
 def answer(campaign: Campaign, row: Recording) -> RecordingAnswer:

@@ -122,20 +122,39 @@ class CutKeys(Body):
     air: FileName | None = Field(None, description="Recording at the same speed without cutting; may serve several cuts.")
 
 
+class HammerTestKeys(Body):
+    """[[frfs]]"""
+
+    id: Text
+    tooling: Text
+    axis: Literal["X", "Y"]
+    response: Literal["tip", "flange"] | float = Field(description="tip, flange (the machine's side of it), or mm from the tip.")
+    force: Literal["tip", "flange"] | float = Field(description="As response; one of the two is a point of tool or holder.")
+    file: FileName = Field(description="File of the FRF; only the last part of a path counts, and its content says what it is.")
+    record: int | None = Field(None, description="Which of several FRFs in the file.")
+    units: str | None = Field(None, description="Of a file that tells none: a motion over a force, such as um/N.")
+    standstill: bool | None = None
+    sensor_mass_g: float | None = None
+    from_hz: float | None = None
+    to_hz: float | None = None
+    error_percent: float | None = Field(None, description="By how much each line may be wrong beside its noise; 2 if left out.")
+
+
 class NewCampaign(Body):
-    """A campaign to make, with the keys of campaign.toml."""
+    """A campaign to make, with the keys of campaign.toml: cuts, hammer tests, or both."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
 
     campaign: HeadKeys | None = None
-    sensors: dict[str, SensorKeys]
-    workpiece: WorkpieceKeys
+    sensors: dict[str, SensorKeys] | None = Field(None, description="Asked for where there are cuts, as is the workpiece.")
+    workpiece: WorkpieceKeys | None = None
     toolings: dict[str, ToolingKeys | str] | None = Field(
         None,
-        description="For each name that the cuts use: a name of the library, the keys of a tooling, or a path that ends in .toml, "
-        "which means the library's tooling of that very name. Left out, all names are the library's.",
+        description="For each name that cuts and hammer tests use: a name of the library, the keys of a tooling, or a path that ends in "
+        ".toml, which means the library's tooling of that very name. Left out, all names are the library's.",
     )
-    cuts: list[CutKeys] = Field(min_length=1)
+    cuts: list[CutKeys] | None = Field(None, min_length=1)
+    frfs: list[HammerTestKeys] | None = Field(None, min_length=1, description="Hammer tests, beside the cuts or in their place.")
 
 
 class VerdictAnswer(Answer):
@@ -151,7 +170,7 @@ class VerdictAnswer(Answer):
 
 
 class FileState(Answer):
-    """A recording that a cut names."""
+    """A file that a cut or a hammer test names."""
 
     name: str
     uploaded: bool
@@ -174,6 +193,18 @@ class CutAnswer(Answer):
     verdict: VerdictAnswer | None = Field(description="With the recordings uploaded so far; null without the cut's recording.")
 
 
+class HammerTestAnswer(Answer):
+    """A hammer test of a campaign."""
+
+    id: str
+    tooling: str
+    axis: Literal["X", "Y"]
+    response: str | float
+    force: str | float
+    file: FileState
+    lines: int | None = Field(description="Lines of its FRF that an identification uses; null without its file.")
+
+
 class CampaignAnswer(Answer):
     """A campaign."""
 
@@ -183,12 +214,13 @@ class CampaignAnswer(Answer):
     created: str
     sampling_rate_hz: float | None
     sensors: dict[str, dict[str, Any]]
-    workpiece: dict[str, Any]
+    workpiece: dict[str, Any] = Field(description="Empty where hammer tests alone tell none.")
     toolings: list[str]
     usable: int = Field(description="Number of cuts that an identification would use.")
     remarks: list[str] = Field(description="What is unusual about its toolings, its workpiece and its cuts.")
     too_few: str | None = Field(description="What is missing, where these are too few for an identification that can be relied on.")
     cuts: list[CutAnswer]
+    hammer_tests: list[HammerTestAnswer] = Field([], description="The tables [[frfs]].")
 
 
 class CampaignSummary(Answer):
@@ -201,20 +233,31 @@ class CampaignSummary(Answer):
     cuts: int
     uploaded: int = Field(description="Number of cuts with a recording.")
     usable: int
-    missing: int = Field(description="Number of recordings, of cuts and in the air, that the campaign names and nobody has uploaded.")
+    hammer_tests: int = Field(0, description="Number of hammer tests.")
+    missing: int = Field(description="Number of files, of cuts, in the air and of hammer tests, that it names and nobody has uploaded.")
     without_air: int = Field(description="Number of cuts for which the campaign names no air cut.")
 
 
+class FrfAnswer(Answer):
+    """An FRF of a hammer test: the lines of it that an identification uses."""
+
+    id: str
+    lines: int
+    from_hz: float
+    to_hz: float
+
+
 class RecordingAnswer(Answer):
-    """An uploaded recording and its description."""
+    """An uploaded recording, or a file of hammer tests, and its description."""
 
     name: str
-    role: Literal["cut", "air"]
-    cuts: list[str]
+    role: Literal["cut", "air", "hammer"]
+    cuts: list[str] = Field(description="Ids of the cuts, or of the hammer tests, that it serves.")
     size_bytes: int
     sha256: str = Field(description="SHA-256 of the original file.")
-    sampling_rate_hz: float
-    duration_s: float
+    sampling_rate_hz: float | None = Field(description="Null for hammer tests, as is the duration.")
+    duration_s: float | None
+    frfs: list[FrfAnswer] = Field([], description="Of hammer tests.")
     channels: list[str]
     spindle_speed_rpm: float | None = Field(description="Measured speed.")
     harmonics_above_noise: dict[str, int] = Field(

@@ -40,14 +40,14 @@ class Recording:
     group, campaign, name : str
         `name` is that of the campaign's declaration.
     role : str
-        cut or air.
+        cut, air or hammer.
     size : int [bytes]
     sha256 : str
         Of the untouched upload, hexadecimal.
     normalised : str
         Names the samples that were read from it.
     found : str
-        JSON: rate, duration, channels, speed, harmonics, verdict.
+        JSON: rate, duration, channels, speed, harmonics, verdict; of hammer tests their lines.
     judged_with : str
         `normalised` of the air cut that the verdict on a cut rests on, empty without one.
     created : str
@@ -73,11 +73,12 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Uploads of a campaign: numbers of cuts with a recording, of those that are usable, and of air cuts."""
+    """Uploads of a campaign: numbers of cuts with a recording, of those that are usable, of air cuts, and of hammer tests' files."""
 
     uploaded: int
     usable: int
     air: int = 0
+    hammer: int = 0
 
 
 #: Kind of a file (upload or samples) and its key.

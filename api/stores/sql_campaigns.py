@@ -76,7 +76,9 @@ class SqlCampaigns:
         with self.store.reading() as connection:
             rows = connection.execute(found.where(_R.c.group == group, _R.c.campaign.in_(ids))).all()
         each = {(campaign, role): (int(count), int(usable)) for campaign, role, count, usable in rows}
-        return {id: Counts(*each.get((id, "cut"), (0, 0)), each.get((id, "air"), (0, 0))[0]) for id in {id for id, _ in each}}
+        none = (0, 0)
+        others = {id: [each.get((id, role), none)[0] for role in ("air", "hammer")] for id, _ in each}
+        return {id: Counts(*each.get((id, "cut"), none), *counted) for id, counted in others.items()}
 
     def delete(self, group: str, id: str) -> bool:
         with self.store.writing() as connection:

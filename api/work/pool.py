@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from queue import SimpleQueue
+from queue import LifoQueue
 from typing import Any, Protocol, TypeVar
 
 from api.shares import GROUP, FairThreads, Shares
@@ -40,27 +40,10 @@ class Work(Protocol):
         """End the processes."""
 
 
-class _Lane:
-    """Processes that share a queue, and the threads that wait for them.
-
-    Parameters
-    ----------
-    members : sequence of Worker
-    name : str
-    """
-
-    def __init__(self, members: Sequence[Worker], name: str) -> None:
-        # a thread for each process: a call waits for both at once
-        self.threads, self.most, self.calls = FairThreads(len(members), name), len(members), 0
-        self.free: SimpleQueue[Worker] = SimpleQueue()
-        for member in members:
-            self.free.put(member)
-
-
 class Pool:
     """Pool of spawned worker processes; the next call is of the group that has fewest at work.
 
-    One process more answers previews alone, while all others work: what takes milliseconds waits behind nothing that takes seconds.
+    One process more answers a preview while all others work on longer questions.
 
     A process is replaced when its query exceeds a limit or is withdrawn: nothing else ends a computation that has begun.
 
@@ -88,7 +71,9 @@ class Pool:
         self.workers, self.machines, self.limits = workers, machines, limits
         self.places = Shares(workers + queue, several)
         self.members: list[Worker] = []
-        self.lanes: tuple[_Lane, _Lane] | None = None
+        # the one that was used last comes first: its machines are read already
+        self.free: LifoQueue[Worker] = LifoQueue()
+        self.threads: FairThreads | None = None
         self.lock = threading.Lock()
 
     @property
@@ -101,10 +86,11 @@ class Pool:
 
     def start(self) -> None:
         self.members = [self._worker() for _ in range(self.workers + 1)]
-        self.lanes = _Lane(self.members[:-1], "work"), _Lane(self.members[-1:], "previews")
-        for lane in self.lanes:
-            for _ in range(lane.most):
-                lane.threads.submit(self._answer, lane, _Call())
+        for member in reversed(self.members):
+            self.free.put(member)
+        self.threads = FairThreads(self.workers, "work", spare=True)
+        for _ in range(self.workers):
+            self.threads.submit(self._answer, _Call())
 
     def _worker(self) -> Worker:
         return Worker(self.limits, partial(_begin, self.machines), warm_observer)
@@ -120,14 +106,13 @@ class Pool:
             The call has exceeded the limit of time, or of memory.
         """
         group = GROUP.get()
-        if self.lanes is None or not self.places.take(group):
+        if self.threads is None or not self.places.take(group):
             raise Busy
-        usual, previews = self.lanes
-        lane = previews if usual.calls >= usual.most and any(getattr(each, "preview", False) for each in arguments) else usual
         asked = _Call(guarded, (call, *arguments))
-        lane.calls += 1
+        preview = any(getattr(each, "preview", False) for each in arguments)
+        submit = self.threads.submit_short if preview else self.threads.submit
         try:
-            answer: T = await asyncio.wrap_future(lane.threads.submit(self._answer, lane, asked))
+            answer: T = await asyncio.wrap_future(submit(self._answer, asked))
             return answer
         except Killed:
             raise Busy from None
@@ -135,12 +120,11 @@ class Pool:
             asked.withdraw()
             raise
         finally:
-            lane.calls -= 1
             self.places.give(group)
 
-    def _answer(self, lane: _Lane, asked: _Call) -> Any:
+    def _answer(self, asked: _Call) -> Any:
         """In a thread: have a free process answer, and replace it where it is of no further use."""
-        member = lane.free.get()
+        member = self.free.get()
         try:
             member = self._fit(member)
             member.begin()
@@ -149,12 +133,12 @@ class Pool:
             try:
                 member = self._fit(member)
             finally:
-                lane.free.put(member)
+                self.free.put(member)
 
     def _fit(self, member: Worker) -> Worker:
         """Return a member that takes calls, or another in its place; the same where the pool ends."""
         with self.lock:
-            if self.lanes is None or (member.fit and member.process.is_alive()):
+            if self.threads is None or (member.fit and member.process.is_alive()):
                 return member
             member.end()
             self.members[self.members.index(member)] = other = self._worker()
@@ -162,15 +146,16 @@ class Pool:
 
     def stop(self) -> None:
         with self.lock:
-            lanes, self.lanes = self.lanes, None
+            threads, self.threads = self.threads, None
         for member in self.members:
             # a running call ends with its process
             member.process.kill()
-        for lane in lanes or ():
-            lane.threads.shutdown(wait=True, cancel_futures=True)
+        if threads is not None:
+            threads.shutdown(wait=True, cancel_futures=True)
         for member in self.members:
             member.end()
         self.members.clear()
+        self.free = LifoQueue()
 
 
 class _Call:

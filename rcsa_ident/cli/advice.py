@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.cli.conditions import change_of, cut_of, drive_of, numbers, share_of, subjects_of
+from rcsa_ident.cli.conditions import change_of, cut_of, drive_of, numbers, share_of, speeds_of, subjects_of
 from rcsa_ident.cli.lobes import Plot, check_plot
 from rcsa_ident.cli.options import Bands, CutOptions, DriveOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_rpm
+from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.units import from_rpm, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,6 +59,24 @@ def advise(
         str | None,
         typer.Option(metavar="A,B,...", help="Compare the tool at these stickouts, mm.", show_default=False, rich_help_panel="Questions"),
     ] = None,
+    next_test: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=200,
+            help="Name so many cuts to test next, whose labels tell most; of LEARNT.json, or of MODES.toml before any label.",
+            show_default=False,
+            rich_help_panel="Questions",
+        ),
+    ] = None,
+    among: Annotated[
+        Path | None,
+        typer.Option(
+            help="CUTS.csv: the cuts to choose from, with --next-test; default: any of the speeds.",
+            show_default=False,
+            rich_help_panel="Questions",
+        ),
+    ] = None,
     tolerance: Annotated[
         float, typer.Option(help="Tolerance of the spindle speed within which a cut stays stable, %.", rich_help_panel="Questions")
     ] = 1.0,
@@ -94,6 +113,11 @@ def advise(
     for path in (out, card):
         if path is not None:
             writable(path)
+    if among is not None and next_test is None:
+        raise InputError("--among", str(among), "given together with --next-test")
+    if next_test is not None:
+        _name_tests(files, tip, cut, speeds, next_test, among, stiffness_spread, json_)
+        return
     if cut.feed_per_tooth_mm is None:
         raise InputError("--feed-per-tooth-mm", "nothing", "the feed per tooth [mm]: power and removal rate grow with it")
     shares = (
@@ -149,6 +173,52 @@ def advise(
     for word, path in (("drawn", plot), ("written", out), ("written", card)):
         if path is not None:
             say(f"{word}: {path}")
+
+
+def _name_tests(
+    files: Sequence[Path],
+    tip: TipOptions,
+    cut: CutOptions,
+    speeds: SpeedOptions,
+    count: int,
+    among: Path | None,
+    stiffness_spread: float,
+    json_: bool,
+) -> None:
+    """Tell which cuts to test next."""
+    from rcsa_ident.cli.learn import believed_of
+    from rcsa_ident.io.tested_cuts import read_candidates
+    from rcsa_ident.stability.methods import METHODS
+    from rcsa_ident.stability.tested_cuts import TestedCuts
+    from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts, next_tests
+
+    spec = cut_of(cut)
+    candidates = None if among is None else read_candidates(among)
+    belief, tooling, learnt = believed_of(files, tip, spec, stiffness_spread)
+    stages = Stages(quiet=json_)
+    with stages.stage("next tests"):
+        if learnt is None:
+            method = METHODS[MethodName.FULL_DISCRETISATION if speeds.method == MethodName.ZERO_ORDER else speeds.method]()
+            learnt = learn_from_cuts(belief, tooling, spec, TestedCuts.none(), method)
+        process = spec.process(tooling.cutter, learnt.workpiece)
+        found = next_tests(learnt, process, count, candidates, speeds_of(speeds), speeds.max_depth_mm * 1e-3)
+    remarks = [*belief.remarks, *learnt.remarks]
+    if json_:
+        rows = [
+            {
+                "spindle_speed_rpm": to_rpm(each.spindle_speed, 6),
+                "axial_depth_mm": round(1e3 * each.axial_depth, 9),
+                "probability_stable": each.probability_stable,
+            }
+            for each in found
+        ]
+        emit({"next_tests": rows, "warnings": remarks, "seconds": stages.seconds})
+        return
+    from rcsa_ident.cli.tables import show_next_tests
+
+    show_next_tests(found)
+    for remark in remarks:
+        warn(remark)
 
 
 def _machine_of(machine: TipSource, files: Sequence[Path], tip: TipOptions) -> str:

@@ -47,6 +47,7 @@ _OPTIONS = {
     "response": ("response", ""),
     "channel": ("channel", ""),
     "sampling_rate_hz": ("rate_hz", ""),
+    "mass": ("mass_g", ""),
 }
 
 Command = TypeVar("Command", bound=Callable[..., Any])

@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 
 
 def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = None, most: int = 1) -> tuple[TipSource, list[Tooling]]:
-    """Return what takes the toolings, and these: RESULT.json (or FLANGE.csv) TOOLING.toml ..., or with --modes or --frf one alone."""
-    from rcsa_ident.cli.results import read_machine
+    """Return what takes the toolings, and these: RESULT.json (or its kin) TOOLING.toml ..., or with --modes or --frf one alone."""
+    from rcsa_ident.cli.results import read_tip_source
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.io.stickouts import read_stickouts
+    from rcsa_ident.machine.learnt_tip import LearntTip
+    from rcsa_ident.machine.machine import Machine
 
     own_tip = tip.modes is not None or bool(tip.frf)
     if tip.modes is not None and tip.frf:
@@ -43,21 +45,28 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
         raise InputError("files", f"{len(files)} files", wanted)
     lengths = None if stickouts is None else [mm * 1e-3 for mm in numbers(stickouts, "--stickout-mm", "mm")]
     paths = files if own_tip else files[1:]
-    toolings = [t for path in paths for t in ([read_tooling(path)] if lengths is None else read_stickouts(path, lengths))]
     if own_tip:
-        return _known_tip(tip), toolings
-    machine = read_machine(files[0])
-    return machine.kept() if len(toolings) > 1 else machine, toolings
+        return _known_tip(tip), [read_tooling(path, tip_known=True) for path in paths]
+    machine = read_tip_source(files[0])
+    if isinstance(machine, LearntTip):
+        if lengths is not None or len(paths) > 1:
+            raise InputError(
+                "files", "several toolings or stickouts", "one tooling, that of the labelled cuts: a learnt tip answers for it alone"
+            )
+        return machine, [read_tooling(paths[0], tip_known=True)]
+    toolings = [t for path in paths for t in ([read_tooling(path)] if lengths is None else read_stickouts(path, lengths))]
+    return machine.kept() if len(toolings) > 1 and isinstance(machine, Machine) else machine, toolings
 
 
 def _known_tip(options: TipOptions) -> TipSource:
     """What stands in the place of a machine: a modal model of the tip, or tap tests of it."""
-    from rcsa_ident.io.modes import read_modes
+    from rcsa_ident.io.modes import read_modes_file
     from rcsa_ident.machine.known_tip import KnownTip
     from rcsa_ident.stability.tip_modes import TipModes
 
     if options.modes is not None:
-        return KnownTip(TipModes.of(read_modes(options.modes)))
+        found = read_modes_file(options.modes)
+        return KnownTip(TipModes.of(found.models), found.coefficients)
     return KnownTip(idle_tip(options.frf or [], options.frf_units))
 
 

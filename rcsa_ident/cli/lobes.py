@@ -112,6 +112,10 @@ def lobes(
             help="CUTS.csv: tested cuts (spindle_speed_rpm, axial_depth_mm, verdict stable|chatter|marginal).", show_default=False
         ),
     ] = None,
+    tests_out: Annotated[
+        Path | None,
+        typer.Option(help="TESTS.csv to write: each tested cut with the probability that it is stable; with --tests.", show_default=False),
+    ] = None,
     surface_depth_mm: Annotated[
         float | None,
         typer.Option(
@@ -133,12 +137,16 @@ def lobes(
 ) -> None:
     """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
     from rcsa_ident.io.lobes import write_lobes, write_map
-    from rcsa_ident.io.tested_cuts import read_tested_cuts
+    from rcsa_ident.io.tested_cuts import read_tested_cuts, write_tests
     from rcsa_ident.report.lobes import Judged
-    from rcsa_ident.workflows.tool_change import advise, map_of, surface_of
+    from rcsa_ident.workflows.tool_change import advise, map_of, probabilities_stable, surface_of
 
     writable(out)
     check_plot(plot)
+    if tests_out is not None:
+        writable(tests_out, "--tests-out")
+        if tests is None:
+            raise InputError("--tests-out", str(tests_out), "given together with --tests")
     if map_ is not None:
         writable(map_, "--map")
     machine, (tooling,) = subjects_of(files, tip)
@@ -157,6 +165,9 @@ def lobes(
             chart = map_of(change, map_depths, map_full)
         write_map(map_, chart)
     write_lobes(out, found, surface, advice.usable.stable)
+    if tests_out is not None and cuts is not None:
+        with stages.stage("tests"):
+            write_tests(tests_out, cuts, probabilities_stable(change, cuts))
     if plot is not None:
         from rcsa_ident.report.lobes import save_figure, stability_figure
 
@@ -170,7 +181,8 @@ def lobes(
         summary = lobes_summary(advice)
         if chart is not None:
             summary |= {"map": {"multipliers": chart.evaluations, "error": chart.error, "out": str(map_)}}
-        emit(summary | {"warnings": remarks, "seconds": stages.seconds, "out": str(out)} | ({} if plot is None else {"plot": str(plot)}))
+        files_ = {name: str(path) for name, path in (("plot", plot), ("tests_out", tests_out)) if path is not None}
+        emit(summary | {"warnings": remarks, "seconds": stages.seconds, "out": str(out)} | files_)
         return
     from rcsa_ident.cli.tables import show_lobes, show_tally
 
@@ -184,6 +196,8 @@ def lobes(
     if chart is not None:
         points = f"{chart.growth.size} cuts, {chart.evaluations} multipliers, {stages.seconds['map']:.2f} s"
         say(f"written: {map_} ({points})")
+    if tests_out is not None:
+        say(f"written: {tests_out}")
     say(f"written: {out} ({found.spindle_speed.size} speeds, {stages.seconds['lobes']:.2f} s)")
 
 

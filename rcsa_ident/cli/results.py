@@ -9,7 +9,7 @@ from rcsa_ident.cli.common import warn
 
 if TYPE_CHECKING:
     from rcsa_ident.identification.machine import IdentifiedMachine
-    from rcsa_ident.machine.machine import Machine
+    from rcsa_ident.machine.machine import Machine, TipSource
 
 
 def read_machine(path: Path) -> Machine:
@@ -17,6 +17,18 @@ def read_machine(path: Path) -> Machine:
     from rcsa_ident.io.flanges import read_flange_machine
 
     return read_flange_machine(path) if path.suffix.lower() == ".csv" else read_identified(path)[0]
+
+
+def read_tip_source(path: Path) -> TipSource:
+    """Return what the tip of a tooling is asked of: the machine of RESULT.json or FLANGE.csv, or a tip that labelled cuts have taught."""
+    from rcsa_ident.io.learnt_tips import is_learnt_tip, learnt_tip_of
+    from rcsa_ident.io.results import read_json
+
+    if path.suffix.lower() != ".csv":
+        data = read_json(path, "result")
+        if is_learnt_tip(data):
+            return learnt_tip_of(data, str(path))
+    return read_machine(path)
 
 
 def read_identified(path: Path) -> tuple[IdentifiedMachine, dict[str, Any]]:

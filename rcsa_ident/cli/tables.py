@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -28,6 +29,9 @@ from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, PlannedCu
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
+
+if TYPE_CHECKING:
+    from rcsa_ident.workflows.learn_from_cuts import NextTest
 
 #: Columns of a terminal that no cell reaches.
 _WIDEST = 10_000
@@ -195,6 +199,24 @@ def show_tally(tally: Tally) -> None:
     show(table)
     if tally.decided:
         out.print(f"classified correctly: {_right(tally)}, {100.0 * tally.share_right:.1f} %")
+
+
+def show_believed(rows: Mapping[str, Any]) -> None:
+    """Print what was believed of modes and coefficients before labels and after them, as means and standard deviations."""
+    table = _table("", "before", "after", title="learnt from labels")
+    table.columns[0].justify = "left"
+    named = [(f"mode {k + 1}, {name}", row) for k, mode in enumerate(rows["modes"]) for name, row in mode.items()]
+    for name, row in [*named, *((name, rows[name]) for name in ("tangential_mpa", "radial_mpa"))]:
+        table.add_row(escape(name.replace("_", " ")), *(f"{mean:.4g} ± {spread:.2g}" for mean, spread in (row["before"], row["after"])))
+    show(table)
+
+
+def show_next_tests(tests: Sequence[NextTest]) -> None:
+    """Print the cuts whose labels tell most, the most telling first."""
+    table = _table("rev/min", "depth mm", "stable with\nprobability", title="next tests, the most telling first")
+    for test in tests:
+        table.add_row(f"{to_rpm(test.spindle_speed):.0f}", f"{1e3 * test.axial_depth:.3g}", f"{test.probability_stable:.2f}")
+    show(table)
 
 
 def show_cases(rows: Sequence[tuple[str, Tally | None, Tally | None]]) -> None:

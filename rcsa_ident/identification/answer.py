@@ -181,7 +181,7 @@ class Fit(ABC):
         squares = (rest[:half] ** 2 + rest[half:] ** 2).reshape(-1, axis.outputs).mean(axis=1)
         tooling = data.cut_tooling[axis.cut]
         per_tooling = {name: float(squares[tooling == t].mean() / 2.0) for t, name in enumerate(data.toolings) if np.any(tooling == t)}
-        measured = misfit.without_delay(i, solution.evaluation.nuisance)
+        measured = misfit.without_delay(i, solution.theta, solution.layout, solution.evaluation.nuisance)
         response = np.abs(measured) ** 2
         lines = {
             "omega": axis.omega,

@@ -260,6 +260,8 @@ class IdentificationData:
         Its receptances while it turns; empty where nobody asks for them.
     tests : tuple of HammerLines
         The last of the cuts. Their gains have no name among the coefficients either and stand in front of the smooth errors.
+    softening_spread : float or None [-]
+        Standard deviation of the stiffness' change from the middle to the end of the speeds; None where nobody told any.
     talk_place : mapping of Dof to int
         Where the share that an axis' sensor feels of the other axis' motion stands among the coefficients.
     rough : RoughToolings or None
@@ -284,6 +286,7 @@ class IdentificationData:
     coefficient_spread: tuple[float, ...] = ()
     turning: Mapping[str, Turning] = field(default_factory=dict)
     tests: tuple[HammerLines, ...] = ()
+    softening_spread: float | None = None
     talk_place: Mapping[Dof, int] = field(default_factory=dict)
     rough: RoughToolings | None = None
     rough_holders: tuple[RoughToolHolder, ...] = ()
@@ -302,51 +305,61 @@ class IdentificationData:
         points = [(axis.omega, self.cut_tooling[axis.cut]) for axis in self.axes]
         return RoughLines(self.rough, self.rough_holders, points, LEVER, self.rough_first)
 
-    def with_scales(self, depth: FloatArray, gain: FloatArray) -> IdentificationData:
-        """Return the same data whose forces may be off by a factor of each tooling, its depth, and motions by one of each axis, its gain.
+    def with_scales(self, depth: FloatArray, gain: FloatArray, delay: FloatArray) -> IdentificationData:
+        """Return the same data whose forces may be off by a factor of each tooling, its depth, and motions by gain and delay of each axis.
 
         Parameters
         ----------
         depth : array, shape (toolings,) [-]
             Standard deviation of the logarithm of each tooling's axial depth; 0 where it is known exactly.
         gain : array, shape (axes,) [-]
-            Of each axis' sensor.
+            Of that of each axis' sensor's gain.
+        delay : array, shape (axes,) [s]
+            Of each axis' sensor's delay.
         """
-        axes = []
-        deep, loud = np.flatnonzero(depth), np.flatnonzero(gain)
+        deep, loud, late = (np.flatnonzero(each) for each in (depth, gain, delay))
+        columns = []
         for i, axis in enumerate(self.axes):
             of_tooling = self.cut_tooling[axis.cut][:, None] == deep
             own = np.broadcast_to(i == loud, (axis.omega.size, loud.size))
-            columns = np.hstack([of_tooling, own]).astype(complex)
-            across = axis.across_slope
-            if across.size:
-                across = np.hstack([across, np.hstack([of_tooling, own]).astype(complex)])
-            axes.append(replace(axis, force_slope=np.hstack([axis.force_slope, columns]), across_slope=across))
-        spread = (*self.coefficient_spread, *depth[deep].tolist(), *gain[loud].tolist())
-        return replace(self, axes=tuple(axes), coefficient_spread=spread)
+            lagging = -1j * axis.omega[:, None] * delay[late] * (i == late)
+            columns.append(np.hstack([of_tooling, own, lagging]))
+        # a delay stands in units of its spread
+        return self._with_unknowns((*depth[deep].tolist(), *gain[loud].tolist(), *(1.0,) * late.size), columns)
 
-    def with_cross_talk(self, spread: float) -> IdentificationData:
-        """Return the same data whose displacement sensors may feel a share of the other axis' motion, of a standard deviation [-]."""
-        lines: dict[Dof, AxisData] = {axis.axis: axis for axis in self.axes}
-        if len(lines) < 2 or spread == 0.0 or not all(axis.force.size for axis in self.axes):
+    def _with_unknowns(self, spread: tuple[float, ...], slopes: Sequence[FloatArray] | Sequence[ComplexArray] | None) -> IdentificationData:
+        """The same data with further unknowns behind the coefficients, and how the logarithms of each axis' lines change with them."""
+        axes = []
+        for i, axis in enumerate(self.axes):
+            more = np.zeros((axis.omega.size, len(spread))) if slopes is None else slopes[i]
+            # the other axis' force in the same lines is asked for where both planes are one machine alone, which has none of these
+            across = np.pad(axis.across_slope, ((0, 0), (0, len(spread)))) if axis.across_slope.size else axis.across_slope
+            axes.append(replace(axis, force_slope=np.hstack([axis.force_slope, more]), across_slope=across))
+        return replace(self, axes=tuple(axes), coefficient_spread=(*self.coefficient_spread, *spread))
+
+    def with_cross_talk(self, spread: FloatArray) -> IdentificationData:
+        """Return the same data whose displacement sensors may feel a share of the other axis' motion.
+
+        Parameters
+        ----------
+        spread : array, shape (axes,) [-]
+            Standard deviation of that share; 0 where it feels nothing.
+        """
+        if len(self.axes) < 2 or not np.any(spread) or not all(axis.force.size for axis in self.axes):
             return self
-        axes, first = [], len(self.coefficient_spread)
-        for axis, other in zip(self.axes, self.axes[::-1], strict=True):
-            place = {key: k for k, key in enumerate(zip(other.cut.tolist(), other.order.tolist(), strict=True))}
-            here = [place.get(key, -1) for key in zip(axis.cut.tolist(), axis.order.tolist(), strict=True)]
-            # a line that the other axis' force does not make is not among its lines, and small
-            seen = other.lines[here, 0] * np.where(np.array(here) < 0, 0.0, other.force[here] / axis.force)[:, None]
-            talk = np.zeros_like(axis.lines)
-            talk[:, 0] = seen
-            slope = np.pad(axis.force_slope, ((0, 0), (0, 2)))
-            across = np.pad(axis.across_slope, ((0, 0), (0, 2))) if axis.across_slope.size else axis.across_slope
-            axes.append(replace(axis, talk=talk, force_slope=slope, across_slope=across))
-        return replace(
-            self,
-            axes=tuple(axes),
-            coefficient_spread=(*self.coefficient_spread, spread, spread),
-            talk_place={axis.axis: first + i for i, axis in enumerate(axes)},
-        )
+        axes, felt = [], dict[Dof, int]()
+        for i, (axis, other) in enumerate(zip(self.axes, self.axes[::-1], strict=True)):
+            if spread[i] > 0.0:
+                felt[axis.axis] = len(self.coefficient_spread) + len(felt)
+                place = {key: k for k, key in enumerate(zip(other.cut.tolist(), other.order.tolist(), strict=True))}
+                here = np.array([place.get(key, -1) for key in zip(axis.cut.tolist(), axis.order.tolist(), strict=True)])
+                talk = np.zeros_like(axis.lines)
+                # a line that the other axis' force does not make is not among its lines, and small
+                talk[:, 0] = other.lines[here, 0] * np.where(here < 0, 0.0, other.force[here] / axis.force)[:, None]
+                axis = replace(axis, talk=talk)
+            axes.append(axis)
+        more = tuple(float(spread[i]) for i, axis in enumerate(axes) if axis.axis in felt)
+        return replace(self, axes=tuple(axes), talk_place=felt)._with_unknowns(more, None)
 
     def with_rough_toolings(self, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
         """Return the same data whose tool-holders are known only roughly.
@@ -357,21 +370,12 @@ class IdentificationData:
             Of all toolings, in the data's order.
         holders : sequence of RoughToolHolder
         """
-        count = len(rough.unknowns)
-        axes = []
-        for axis in self.axes:
-            slopes = np.pad(axis.force_slope, ((0, 0), (0, count)))
-            across = np.pad(axis.across_slope, ((0, 0), (0, count))) if axis.across_slope.size else axis.across_slope
-            axes.append(replace(axis, force_slope=slopes, across_slope=across))
-        return replace(
-            self,
-            axes=tuple(axes),
-            coefficient_spread=(*self.coefficient_spread, *(1.0,) * count),
-            rough=rough,
-            rough_holders=tuple(holders),
-            rough_first=len(self.coefficient_spread),
-            rough_start=np.zeros(count),
-        )
+        count, first = len(rough.unknowns), len(self.coefficient_spread)
+        # who knows a tool only roughly knows its force no better: an error of depth, edge or run-out is a share of the whole force, and
+        # where little of that points along an axis, much of the little
+        axes = tuple(replace(a, beside=(a.power.T * np.abs(a.across / a.force) ** 2).T) if a.across.size else a for a in self.axes)
+        held = replace(self, axes=axes, rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
+        return held._with_unknowns((1.0,) * count, None)
 
     def with_toolings_at(self, values: FloatArray) -> IdentificationData:
         """Return the same data whose tool-holders stand at other values of what their drawings do not tell, shape (u,)."""

@@ -18,7 +18,16 @@ from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.score import STRIKES, Coupling, coupling
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
-from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, first_starts, fit_jointly, fit_roughly, grow_jointly, learned_noise
+from rcsa_ident.identification.joint_fit import (
+    AxisSearch,
+    axis_search,
+    first_starts,
+    fit_jointly,
+    fit_roughly,
+    fit_with_places,
+    grow_jointly,
+    learned_noise,
+)
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import (
@@ -30,7 +39,7 @@ from rcsa_ident.identification.model_order import (
     exchange_modes,
     model_error,
 )
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, planes, unpack, with_places
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, planes, unpack
 from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
@@ -98,6 +107,9 @@ class EvidenceSelection:
         """
         if not_finite(data):
             return failed(data, seed, self.name)
+        told = data.softening_spread
+        if told is not None and told != self.priors.softening:
+            return replace(self, priors=replace(self.priors, softening=told)).run(data, seed, map, progress)
         try:
             sequence, trace, freed = np.random.SeedSequence(seed), list[Step](), data
             found = self._found(data, data, sequence, map, trace, progress)
@@ -178,7 +190,7 @@ class EvidenceSelection:
         Lines of passes are freed of their sweeps ever better: as the searches took them, `freed`, then by each fit; whether their planes
         feel each other is asked of the last answer alone, as lines that still sweep may feign it.
         """
-        if data.beside and data.rough is None and couplable(data):
+        if data.beside:
             return self._fit_with_places(data, freed, searched, map, report)
         smooth = freed.with_smooth_errors(SMOOTH_ERROR)
         first = first_starts(smooth, self.priors, searched, map)
@@ -208,15 +220,18 @@ class EvidenceSelection:
     def _fit_with_places(
         self, data: IdentificationData, freed: IdentificationData, searched: list[AxisSearch], map: Map, report: Report
     ) -> Fit:
-        """Return the same where accelerometers on the housing stand beside: both planes together are fitted without them."""
+        """Return the same where further places are among the outputs, from what the others have come to without them.
+
+        Whether planes feel each other is decided by the flange's lines alone: evidences of different lines cannot be compared, and both
+        planes together are fitted without further places.
+        """
+        fewer = self._fit(data.first(), freed.first(), searched, map, report)
+        if isinstance(fewer, CoupledFit):
+            return replace(fewer, data=data)
+        assert isinstance(fewer, PlaneFit)
         smooth = freed.with_smooth_errors(SMOOTH_ERROR)
-        apart, misfit = fit_jointly(smooth, self.priors, searched, first_starts(smooth, self.priors, searched, map), report)
-        if self._felt(coupled_data(smooth), apart.candidate, misfit.model_error, misfit.cut_weight).score > STRIKES:
-            # evidences of different lines cannot be compared: those of the flange alone decide whether its planes feel each other
-            found = self._fit(data.first(), freed.first(), searched, map, report)
-            if isinstance(found, CoupledFit):
-                return replace(found, data=data)
-        return PlaneFit(data, searched, *grow_jointly(smooth, self.priors, apart, misfit, report))
+        chosen, misfit = fit_with_places(smooth, self.priors, fewer.rival, fewer.misfit, report)
+        return PlaneFit(data, searched, *grow_jointly(smooth, self.priors, chosen, misfit, report))
 
     def _asked(self, data: IdentificationData, found: Fit, map: Map, report: Report) -> Fit:
         """Return the answer of passes, or that of both planes as one machine where they feel each other."""
@@ -235,8 +250,7 @@ class EvidenceSelection:
     def _felt(self, points: CoupledData, apart: Candidate, model_error: tuple[float, ...], weight: FloatArray) -> Coupling:
         """Return what the lines say against planes that feel nothing of each other, with the noise that was learned."""
         misfit = CoupledMisfit(points, self.priors, model_error, weight)
-        theta, layout = with_places(apart.theta, planes(apart.layout), [axis.places for axis in points.base.axes])
-        return coupling(theta, layout, apart.nuisance, misfit)
+        return coupling(apart.theta, planes(apart.layout), apart.nuisance, misfit)
 
     def _together(
         self,

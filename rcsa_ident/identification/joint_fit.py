@@ -130,6 +130,24 @@ def fit_jointly(
     return exchange_modes(found, misfit, data.band_hz, report, rounds=2), misfit
 
 
+def fit_with_places(data: IdentificationData, priors: Priors, found: Solution, misfit: Misfit, report: Report) -> tuple[Solution, Misfit]:
+    """Return the solution for lines that show further places, from one for those without, and its misfit.
+
+    Parameters
+    ----------
+    data : IdentificationData
+        As in `fit_jointly`.
+    priors : Priors
+    found : Solution
+    misfit : Misfit
+        Of the solution without them: what it has learned of the noise.
+    report : callable of (stage, cost, solution)
+    """
+    start = _start(data, found.candidate, any(axis.softening for axis in planes(found.layout).axes))
+    found, misfit = refine_and_learn_noise(partial(Misfit, data, priors), start, misfit.model_error, misfit.cut_weight, report)
+    return exchange_modes(found, misfit, data.band_hz, report, rounds=2), misfit
+
+
 def grow_jointly(
     data: IdentificationData, priors: Priors, chosen: Solution, misfit: Misfit, report: Report
 ) -> tuple[Solution, Misfit, Solution]:

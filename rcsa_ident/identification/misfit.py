@@ -158,10 +158,12 @@ class Misfit:
         assert isinstance(layout, Layout)
         return prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
 
-    def without_delay(self, i: int, nuisance: FloatArray) -> ComplexArray:
+    def without_delay(self, i: int, theta: FloatArray, layout: Unknowns, nuisance: FloatArray) -> ComplexArray:
         """Return the measured motion of an axis (see `AxisData.measured`) with tooth 1 at immersion 0 at the start, shape (n,) [m/N]."""
         lines = self._axes[i]
-        return np.sum(lines.turned(lines.lines, nuisance)[0].reshape(-1, lines.outputs)[:, self.data.axes[i].searched], axis=1)
+        return np.sum(
+            lines.turned(self._seen(theta, layout)[i], nuisance)[0].reshape(-1, lines.outputs)[:, self.data.axes[i].searched], axis=1
+        )
 
     def weight(self, i: int) -> FloatArray:
         """Return the weights of an axis' lines, shape (n, o) [N^2/m^2]."""

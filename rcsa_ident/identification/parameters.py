@@ -12,8 +12,7 @@ machine with real modes.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -297,23 +296,6 @@ def pack(axis: AxisParameters, layout: AxisLayout | None = None) -> FloatArray:
     if layout.softening:
         parts.append(axis.softening[rows, cols] if axis.softening.size else np.zeros(layout.pairs))
     return np.concatenate(parts)
-
-
-def with_places(theta: FloatArray, layout: Layout, places: Sequence[int]) -> tuple[FloatArray, Layout]:
-    """Return the vector whose axes tell of so many other places, the first ones; others start at rest.
-
-    Parameters
-    ----------
-    theta : array, shape (p,)
-    layout : Layout
-    places : sequence of int
-        Of each axis.
-    """
-    axes = tuple(replace(axis, places=count) for axis, count in zip(layout.axes, places, strict=True))
-    if axes == layout.axes:
-        return theta, layout
-    parts = [pack(unpack(theta[layout.axis(i)], old), new) for i, (old, new) in enumerate(zip(layout.axes, axes, strict=True))]
-    return np.concatenate([*parts, theta[layout.tail :]]), replace(layout, axes=axes)
 
 
 def chain(axis: AxisParameters, layout: AxisLayout) -> FloatArray:

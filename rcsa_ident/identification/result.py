@@ -55,6 +55,7 @@ class IdentificationCode(StrEnum):
     HOUSING_ALONE = "housing-alone"
     HOUSING_LEFT_OUT = "housing-left-out"
     PLANES_NOT_ASKED = "planes-not-asked"
+    DRAWINGS_EXACT = "drawings-exact"
     CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
     MOSTLY_PASSES = "mostly-passes"
 

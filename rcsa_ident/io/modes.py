@@ -1,23 +1,97 @@
-"""MODES.toml: a modal model of the tip, from a tap test or a catalogue."""
+"""MODES.toml: a modal model of the tip, from a tap test or a catalogue, and how well it is known."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.units import from_hz
+from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.uncertain_tip import UncertainTip
+from rcsa_ident.units import from_hz, from_rpm
 
-_MODE = ("natural_frequency_hz", "damping_ratio", "modal_mass_kg", "stiffness_n_per_m")
+_TOP = ("x", "y", "coefficients", "softening_sd_percent_per_1000_rpm")
+#: Values of a mode, each with the key of its standard deviation and its unit; of the last two a mode has one.
+_VALUES = {
+    "natural_frequency_hz": ("natural_frequency_sd_hz", "Hz"),
+    "damping_ratio": ("damping_ratio_sd", ""),
+    "modal_mass_kg": ("modal_mass_sd_kg", "kg"),
+    "stiffness_n_per_m": ("stiffness_sd_n_per_m", "N/m"),
+}
+_WEIGHTS = ("modal_mass_kg", "stiffness_n_per_m")
+_MODE = (*_VALUES, *(spread for spread, _ in _VALUES.values()))
+_COEFFICIENTS = ("tangential_mpa", "tangential_sd_mpa", "radial_mpa", "radial_sd_mpa")
+#: A standard deviation may be so many times the value.
+_WIDEST = 2.0
 
 
-def read_modes(path: str | Path) -> dict[Dof, ModalModel]:
+@dataclass(frozen=True, slots=True, eq=False)
+class ModesFile:
+    """What stands in MODES.toml.
+
+    Parameters
+    ----------
+    models : mapping of Dof to ModalModel
+        At ``tip.x`` and ``tip.y``; a direction without tables is rigid and missing here.
+    spreads : array, shape (3, m)
+        Standard deviations of natural frequencies, damping ratios and stiffnesses (or masses) over the values, X before Y; NaN where
+        the file tells none.
+    coefficients : CuttingCoefficients or None
+    coefficient_spreads : (float, float)
+        Standard deviations of K_tc and K_rc over the values, NaN where the file tells none.
+    softening : float [s/rad]
+        As of `UncertainTip`.
+    missing : str
+        The first standard deviation that the file does not tell; empty where it tells all.
+    where : str
+    """
+
+    models: Mapping[Dof, ModalModel]
+    spreads: FloatArray
+    coefficients: CuttingCoefficients | None
+    coefficient_spreads: tuple[float, float]
+    softening: float
+    missing: str
+    where: str
+
+    def uncertain_tip(self, coefficients: CuttingCoefficients | None = None) -> tuple[UncertainTip, CuttingCoefficients]:
+        """Return modes and coefficients with their standard deviations, which labelled cuts go on from.
+
+        Parameters
+        ----------
+        coefficients : CuttingCoefficients, optional
+            With their own spreads, where the file has none.
+
+        Raises
+        ------
+        InputError
+            If a standard deviation is missing, or nothing tells the coefficients.
+        """
+        top = Table({}, self.where)
+        if self.missing:
+            top.refuse(
+                self.missing, "nothing", "the value's standard deviation, 0 where it is taken for exact: labels move what is not known"
+            )
+        spreads = self.coefficient_spreads
+        if self.coefficients is not None:
+            coefficients = self.coefficients
+        elif coefficients is not None:
+            spreads = coefficients.tangential_spread, float(np.hypot(coefficients.tangential_spread, coefficients.ratio_spread))
+        else:
+            top.refuse("coefficients", "nothing", f"a table [coefficients] with {', '.join(_COEFFICIENTS)}")
+        return UncertainTip.independent(TipModes.of(self.models), self.spreads, spreads, self.softening), coefficients
+
+
+def read_modes(path: str | Path) -> Mapping[Dof, ModalModel]:
     """Return the modes of each direction at ``tip.x`` or ``tip.y``; a direction without tables is rigid and missing here.
 
     Raises
@@ -25,29 +99,62 @@ def read_modes(path: str | Path) -> dict[Dof, ModalModel]:
     InputError
         Names the file, the key, what was found and what is allowed.
     """
+    return read_modes_file(path).models
+
+
+def read_modes_file(path: str | Path) -> ModesFile:
+    """Return the modes with what is told of their spread and of the coefficients; raises as `read_modes` does."""
     return modes_of(read_toml(path, "modes"), str(path))
 
 
-def modes_of(data: Mapping[str, Any], where: str) -> dict[Dof, ModalModel]:
-    """Return the modes of a table of keys as `read_modes` finds them in a file; `where` is the file, for the messages."""
-    top = Table(data, where, known=("x", "y"))
-    models = {axis: _model(top, axis) for axis in (Dof.X, Dof.Y) if axis in top}
+def modes_of(data: Mapping[str, Any], where: str) -> ModesFile:
+    """Return what a table of keys holds as `read_modes_file` finds it in a file; `where` is the file, for the messages."""
+    top = Table(data, where, known=_TOP)
+    models, spreads, missing = {}, [np.zeros((3, 0))], list[str]()
+    for axis in (Dof.X, Dof.Y):
+        if axis in top:
+            models[axis], own = _model(top.tables(axis, _MODE), axis, missing)
+            spreads.append(own)
     if not models:
         top.refuse("x", "nothing", "tables [[x]], [[y]] or both")
-    return models
+    coefficients, shares = (
+        _coefficients(top.table("coefficients", _COEFFICIENTS), missing) if "coefficients" in top else (None, (np.nan, np.nan))
+    )
+    softening = 1e-5 * top.number("softening_sd_percent_per_1000_rpm", "%", 0.0, least=0.0, most=20.0) / from_rpm(1.0)
+    return ModesFile(models, np.concatenate(spreads, axis=1), coefficients, shares, softening, next(iter(missing), ""), where)
 
 
-def _model(top: Table, axis: Dof) -> ModalModel:
-    tables = top.tables(axis, _MODE)
+def _model(tables: list[Table], axis: Dof, missing: list[str]) -> tuple[ModalModel, FloatArray]:
     omega = from_hz(np.array([t.number("natural_frequency_hz", "Hz", above=0.0, most=1e6) for t in tables]))
     zeta = np.array([t.number("damping_ratio", "", above=0.0, most=0.999) for t in tables])
-    mass = np.array([_mass(t, w) for t, w in zip(tables, omega, strict=True)])
-    return normal_modes(omega, zeta, 1.0 / np.sqrt(mass)[:, None], (Coordinate("tip", axis),))
+    weights = [t.one_of(_WEIGHTS, "one of modal_mass_kg [kg] and stiffness_n_per_m [N/m]") for t in tables]
+    weight = np.array([t.number(key, _VALUES[key][1], above=0.0) for t, key in zip(tables, weights, strict=True)])
+    mass = np.where([key == "modal_mass_kg" for key in weights], weight, weight / omega**2)
+    spreads = [[_spread(t, key, missing) for key in (*list(_VALUES)[:2], own)] for t, own in zip(tables, weights, strict=True)]
+    return normal_modes(omega, zeta, 1.0 / np.sqrt(mass)[:, None], (Coordinate("tip", axis),)), np.array(spreads).T
 
 
-def _mass(table: Table, omega: float) -> float:
-    """The modal mass as given, or k / omega_n^2."""
-    given = table.one_of(_MODE[2:], "one of modal_mass_kg [kg] and stiffness_n_per_m [N/m]")
-    if given == "modal_mass_kg":
-        return table.number("modal_mass_kg", "kg", above=0.0)
-    return table.number("stiffness_n_per_m", "N/m", above=0.0) / omega**2
+def _spread(table: Table, key: str, missing: list[str]) -> float:
+    """Standard deviation over the value, NaN where none is told."""
+    name, unit = _VALUES[key]
+    for other in _WEIGHTS:
+        if key in _WEIGHTS and other != key and _VALUES[other][0] in table:
+            table.refuse(_VALUES[other][0], "the standard deviation of a value that is not given", name)
+    mean = table.number(key, unit, above=0.0)
+    found = table.number(name, unit, None, least=0.0, most=_WIDEST * mean)
+    if found is None:
+        missing.append(table.name(name))
+        return float("nan")
+    return float(found / mean)
+
+
+def _coefficients(table: Table, missing: list[str]) -> tuple[CuttingCoefficients, tuple[float, float]]:
+    means = {name: table.number(f"{name}_mpa", "MPa", above=0.0) for name in ("tangential", "radial")}
+    spreads = []
+    for name, mean in means.items():
+        spread = table.number(f"{name}_sd_mpa", "MPa", None, least=0.0, most=_WIDEST * mean)
+        missing += [] if spread is not None else [table.name(f"{name}_sd_mpa")]
+        spreads.append(np.nan if spread is None else spread / mean)
+    with table.naming({"tangential coefficient": "coefficients.tangential_mpa", "radial_ratio": "coefficients.radial_mpa"}):
+        found = CuttingCoefficients(1e6 * means["tangential"], means["radial"] / means["tangential"])
+    return found, (spreads[0], spreads[1])

@@ -7,10 +7,11 @@ from importlib import import_module
 from pathlib import Path
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import RATE
+from rcsa_ident.io.channels import RATE, notes_of
 from rcsa_ident.io.recordings import READERS, SOUND, read_signals
 from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, name_and_unit, of_unit, told_table
 from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.verdict import RecordCode
 
 #: Tables of text.
 TEXT = (".csv", ".txt", ".dat", ".tsv", ".asc")
@@ -77,4 +78,5 @@ def _sound(path: Path, names: Sequence[str], suffix: str) -> OpenRecording:
     wanted = list(names) or ["ch1"]
     rate, signals = read_signals(path, wanted, suffix=suffix)
     channels = tuple(OpenChannel(name, "", Quantity.SOUND, signal[:]) for name, signal in zip(wanted, signals, strict=True))
-    return OpenRecording(rate, channels, () if names else ("taken as sound, the first channel of the file",))
+    lossy = any(note.code is RecordCode.LOSSY for note in notes_of(signals))
+    return OpenRecording(rate, channels, () if names else ("taken as sound, the first channel of the file",), lossy)

@@ -179,9 +179,8 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
     samples = np.empty((signals[0].size, len(sensors)))
     with np.errstate(all="ignore"):
         for i, (sensor, values) in enumerate(zip(sensors, signals, strict=True)):
-            samples[:, i] = values[:]
-            if sensor.quantity is not Quantity.TRIGGER:
-                samples[:, i] /= sensor.sensitivity
+            sensitivity = 1.0 if sensor.quantity is Quantity.TRIGGER else sensor.sensitivity
+            np.divide(values[:], sensitivity, out=samples[:, i], dtype=float)
     # an overflow in the acquisition is a lost sample like any other
     samples[np.isinf(samples)] = np.nan
     samples.setflags(write=False)

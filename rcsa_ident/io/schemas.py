@@ -51,7 +51,7 @@ _TOOLINGS = (
         "name": "all",
         "cutter": _CUTTER,
         "tool": {"stickout_mm": 70.0, "segments": _SEGMENTS, "model": "EM12-4"},
-        "holder": _HOLDER | {"model": "PG25"},
+        "holder": _HOLDER | {"model": "PG25", "taper": "HSK-A63"},
         "contact": _STIFF,
         "materials": _MATERIALS,
         "spread": dict.fromkeys(SPREADS, 1.0),
@@ -139,7 +139,14 @@ _MACHINES = (
 _MODE = {"natural_frequency_hz": 500.0, "damping_ratio": 0.03}
 _MODES = (
     {"x": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}]},
-    {"y": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}]},
+    {
+        "y": [
+            _MODE | {"modal_mass_kg": 1.0, "modal_mass_sd_kg": 0.1, "natural_frequency_sd_hz": 5.0, "damping_ratio_sd": 0.01},
+            _MODE | {"stiffness_n_per_m": 1e7, "stiffness_sd_n_per_m": 1e6},
+        ],
+        "coefficients": {"tangential_mpa": 900.0, "tangential_sd_mpa": 90.0, "radial_mpa": 270.0, "radial_sd_mpa": 50.0},
+        "softening_sd_percent_per_1000_rpm": 1.0,
+    },
 )
 
 

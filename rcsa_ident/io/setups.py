@@ -18,7 +18,7 @@ from rcsa_ident.io.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
-from rcsa_ident.machining_setup import Campaign, Cut, Tooling
+from rcsa_ident.machining_setup import BareCutter, Campaign, Cut, Tooling
 from rcsa_ident.plausibility import (
     AXIAL_DEPTH,
     CONTACT,
@@ -35,8 +35,9 @@ from rcsa_ident.plausibility import (
 )
 from rcsa_ident.signals.motion import measured_axes, motion_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
-from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, behind, clamped
 from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, Spread
+from rcsa_ident.tool_holder.taper import tapers
 from rcsa_ident.units import from_rpm, to_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -59,8 +60,21 @@ _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
 SPREADS = {
     f"{field}_mm" if field in LENGTHS else f"{field}_percent": (field, 1e-3 if field in LENGTHS else 1e-2) for field in SPREAD_FIELDS
 }
+_HEAD = ("name", "sampling_rate_hz", "clock_error_percent", "axial_depth_spread_mm", "speed_softening_percent")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts", "frfs")
-_SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz", "role", "mount_resonance_hz", "rotation_deg")
+_SENSOR = (
+    "quantity",
+    "axis",
+    "sensitivity",
+    "delay_s",
+    "bandwidth_hz",
+    "role",
+    "mount_resonance_hz",
+    "rotation_deg",
+    "gain_spread_percent",
+    "cross_talk_percent",
+    "delay_spread_us",
+)
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
 _CUT = (
     "id",
@@ -77,15 +91,25 @@ _CUT = (
 )
 
 
-def read_tooling(path: str | Path) -> Tooling:
+def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
     """Return a cutter with the tool and holder that carry it, the tool cut to stickout + insertion.
+
+    Parameters
+    ----------
+    path : path
+    tip_known : bool
+        Where modes or FRFs of the tip are given a file may hold its ``[cutter]`` alone: neither ``[tool]`` nor ``[holder]``.
 
     Raises
     ------
     InputError
         Names the file, the key, what was found and what is allowed.
     """
-    return tooling_of(read_toml(path, "tooling"), str(path), Path(path).stem)
+    data = read_toml(path, "tooling")
+    if tip_known and "tool" not in data and "holder" not in data:
+        top = Table(data, str(path), known=_TOOLING)
+        return BareCutter(top.text("name", Path(path).stem), _cutter(top.table("cutter", _CUTTER)))
+    return tooling_of(data, str(path), Path(path).stem)
 
 
 def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
@@ -103,7 +127,7 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     top = Table(data, where, known=_TOOLING)
     materials = material_library(top)
     tool = top.table("tool", ("stickout_mm", "segments", "model"))
-    holder = top.table("holder", ("insertion_mm", "segments", "model"))
+    holder = top.table("holder", ("insertion_mm", "segments", "model", "taper"))
     name = top.text("name", name)
     cutter = _cutter(top.table("cutter", _CUTTER))
     pieces = beam_segments(tool, materials)
@@ -112,13 +136,16 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     carriers = beam_segments(holder, materials)
     contact = _contact(top.table("contact", _CONTACT)) if "contact" in top else None
     with top.naming({"stickout + insertion": "tool.stickout_mm + holder.insertion_mm", "insertion": "holder.insertion_mm"}):
+        assembly = clamped(pieces, carriers, stickout, insertion, contact)
         return Tooling(
             name,
             cutter,
-            clamped(pieces, carriers, stickout, insertion, contact),
+            assembly,
             spread_of(top.table("spread", tuple(SPREADS))) if "spread" in top else EXACT,
             tool.text("model", ""),
             holder.text("model", ""),
+            holder.text("taper", "", choices=tapers()),
+            behind(pieces, assembly),
         )
 
 
@@ -249,10 +276,12 @@ def campaign_of(
         Given the table of a cut and its key ``cut`` or ``air``, or that of a hammer test and ``file``, returns the file.
     """
     top = Table(data, where, known=_CAMPAIGN)
-    head = top.table("campaign", ("name", "sampling_rate_hz", "clock_error_percent"), {})
+    head = top.table("campaign", _HEAD, {})
     name = head.text("name", name)
     rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
     clock = head.number("clock_error_percent", "%", 0.0, least=-2.0, most=2.0) * 1e-2
+    depth = head.number("axial_depth_spread_mm", "mm", 0.02, least=0.0, most=1.0) * 1e-3
+    softening = head.number("speed_softening_percent", "%", 3.0, above=0.0, most=50.0) * 1e-2
     # hammer tests alone need neither sensors nor a workpiece
     alone = "frfs" in top and "cuts" not in top
     channels = top.table("sensors", None, {})
@@ -276,7 +305,7 @@ def campaign_of(
         if id in seen:
             raise InputError(f"{place}.id", f'"{id}", the id of {seen[id]}', "an id of its own", where)
         seen[id] = place
-    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock, tests)
+    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock, tests, depth, softening)
 
 
 def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
@@ -328,6 +357,9 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         None if role is None else Role(role),
         table.number("mount_resonance_hz", "Hz", None, above=0.0),
         float(np.radians(table.number("rotation_deg", "deg", 0.0, least=-180.0, most=180.0))),
+        table.number("gain_spread_percent", "%", 2.0, least=0.0, most=50.0) * 1e-2,
+        table.number("cross_talk_percent", "%", 1.5, least=0.0, most=50.0) * 1e-2,
+        table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) * 1e-6,
     )
 
 

@@ -56,6 +56,8 @@ class TextTable:
         InputError
             A cell is no number; the message names its line and column.
         """
+        if not self.lines:  # a part of a long file that is empty lines alone
+            return [np.empty(0) for _ in names]
         places = [self.header.index(name) for name in names]
         try:
             values = np.loadtxt(self.lines, delimiter=self.delimiter, usecols=places, comments=None, ndmin=2)
@@ -132,6 +134,27 @@ class _Parts:
             rows = self._decimal_point(rows, numbers)
         return TextTable(self.where, self.header, delimiter, rows, numbers)
 
+    def plain(self, block: bytes, names: Sequence[str]) -> tuple[np.ndarray, list[FloatArray]] | None:
+        """Return line numbers and named columns of a part, shape (n,) each, as `next` and `TextTable.columns` would.
+
+        At a fifth of their time; None where something in it is not plain, and where decimal signs stand for the first time.
+        """
+        comma, point = (sign in block for sign in (b",", b"."))
+        comma = comma and self.delimiter != ","
+        if not self.header or (comma and (self.comma is None or point)) or (point and self.delimiter != "," and self.point is None):
+            return None
+        # the compiler is no business of those who read a short file
+        from rcsa_ident.io import _kernels
+
+        raw = np.frombuffer(block if block.endswith(b"\n") else block + b"\n", np.uint8)
+        places = np.array([names.index(name) if name in names else -1 for name in self.header])
+        values = np.empty((np.count_nonzero(raw == ord("\n")), len(names)))
+        sign = "," if self.comma else "."
+        if _kernels.decimal_rows(raw, ord(self.delimiter), ord(sign), places, values) < 0:
+            return None
+        behind, self.lines = self.lines, self.lines + len(values)
+        return np.arange(behind + 1, self.lines + 1, dtype=np.int32), list(values.T)
+
     def _read_header(self, lines: list[str], numbers: list[int]) -> None:
         """Take comments and the header away from the numbers of the lines."""
         while numbers and lines[numbers[0] - 1].lstrip().startswith("#"):
@@ -160,18 +183,16 @@ def _first(sign: str, rows: list[str], numbers: list[int]) -> tuple[int, str] | 
     return next(((number, row.strip()) for row, number in zip(rows, numbers, strict=True) if sign in row), None)
 
 
-def _parts(path: Path, field: str, largest: int) -> Iterator[TextTable]:
-    """Yield a text table in parts of a few megabytes."""
-    parts, where = _Parts(field, str(path)), str(path)
+def _blocks(path: Path, field: str, largest: int) -> Iterator[bytes]:
+    """Yield a file's bytes in blocks of whole lines, a few megabytes each."""
     existing_file(path, field, largest)
     try:
         with path.open("rb") as file:
             while block := file.read(_PART):
                 # UTF-16 has no byte that is a line's end
-                whole = block.startswith(_UTF16) and not parts.header
-                yield parts.next(decoded(block + (file.read() if whole else file.readline()), field, where))
+                yield block + (file.read() if block.startswith(_UTF16) else file.readline())
     except OSError as error:
-        raise InputError(field, error.strerror or "an error on reading", "a file that can be read", where) from None
+        raise InputError(field, error.strerror or "an error on reading", "a file that can be read", str(path)) from None
 
 
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
@@ -188,16 +209,21 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         For a file that carries no rate.
     """
     where = str(path)
+    parts = _Parts("recording", where)
     time: list[str] = []
     scratch: list[Scratch] = []
     numbers: list[np.ndarray] = []
-    for table in _parts(path, "recording", LARGEST_TEXT):
-        if not scratch:
-            time = _time_column(table, names)
-            scratch = [Scratch() for _ in (*time, *names)]
-        for column, values in zip(scratch, table.columns([*time, *names]), strict=True):
+    for block in _blocks(path, "recording", LARGEST_TEXT):
+        found = parts.plain(block, [*time, *names])
+        if found is None:
+            table = parts.next(decoded(block, "recording", where))
+            if not scratch:
+                time = _time_column(table, names)
+                scratch = [Scratch() for _ in (*time, *names)]
+            found = np.array(table.numbers, dtype=np.int32), table.columns([*time, *names])
+        numbers.append(found[0])
+        for column, values in zip(scratch, found[1], strict=True):
             column.add(values)
-        numbers.append(np.array(table.numbers, dtype=np.int32))
     columns = [column.channel() for column in scratch]
     if not time:
         if default_rate is None:

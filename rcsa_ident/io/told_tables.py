@@ -69,11 +69,14 @@ class OpenRecording:
     channels : tuple of OpenChannel
     remarks : tuple of str
         What was guessed, in sentences.
+    lossy : bool
+        Compressed with loss: lines stay where they are, decays do not.
     """
 
     rate: float
     channels: tuple[OpenChannel, ...]
     remarks: tuple[str, ...] = ()
+    lossy: bool = False
 
     def of(self, quantity: Quantity | None = None, names: Sequence[str] = ()) -> tuple[Quantity, tuple[OpenChannel, ...]]:
         """Return the channels of one quantity: those that are named, or all of the first quantity of acceleration, sound, force and motion.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +30,14 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     """Return a tooling as its file holds it, in the machinist's units."""
     cutter, assembly = tooling.cutter, tooling.assembly
     materials = dict(MATERIALS)
-    for segment in (*assembly.tool, *assembly.holder):
+    for segment in (*tooling.whole_tool, *assembly.holder):
         if segment.material not in materials.values():
             materials[f"material {len(materials) - len(MATERIALS) + 1}"] = segment.material
     names = {material: name for name, material in materials.items()}
     data: dict[str, Any] = {
         "name": tooling.name,
         "cutter": {"teeth": cutter.teeth, "diameter_mm": 1e3 * cutter.diameter, "helix_deg": float(np.degrees(cutter.helix))},
-        "tool": {"stickout_mm": 1e3 * assembly.stickout, "segments": [_segment(s, names) for s in assembly.tool]},
+        "tool": {"stickout_mm": 1e3 * assembly.stickout, "segments": [_segment(s, names) for s in _joined(tooling)]},
         "holder": {"insertion_mm": 1e3 * assembly.insertion, "segments": [_segment(s, names) for s in assembly.holder]},
     }
     if np.ptp(cutter.pitch) > 1e-9:
@@ -50,10 +51,26 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     for part, model in (("tool", tooling.tool_model), ("holder", tooling.holder_model)):
         if model:
             data[part]["model"] = model
+    if tooling.taper:
+        data["holder"]["taper"] = tooling.taper
     if not tooling.spread.exact:
         data["spread"] = spread_keys(tooling.spread)
     own = {name: material for name, material in materials.items() if name not in MATERIALS}
     return data | ({"materials": {name: _material(material) for name, material in own.items()}} if own else {})
+
+
+def _joined(tooling: Tooling) -> list[BeamSegment]:
+    """The whole tool's segments, that which the insertion ends in as one again."""
+    *front, last = tooling.assembly.tool
+    if not tooling.tool_behind:
+        return [*front, last]
+    first, *rear = tooling.tool_behind
+    slope = (last.end - last.diameter) / last.length
+    same = replace(first, length=1.0, diameter=1.0, end_diameter=None) == replace(last, length=1.0, diameter=1.0, end_diameter=None)
+    goes_on = abs(last.end - first.diameter) < 1e-9 and abs((first.end - first.diameter) / first.length - slope) < 1e-9
+    if not (same and goes_on):
+        return [*front, last, first, *rear]
+    return [*front, replace(last, length=last.length + first.length, end_diameter=None if last.end_diameter is None else first.end), *rear]
 
 
 def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:

@@ -19,7 +19,8 @@ _SPREADS = {
     "radial_ratio_spread_percent": _USUAL.ratio_spread,
     "edge_spread_percent": _USUAL.edge_spread,
 }
-WORKPIECE_KEYS = ("name", "tangential_coefficient_mpa", "radial_ratio", "axial_ratio", *_EDGES, *_SPREADS)
+_UNTOLD_EDGE = "edge_force_spread_n_per_mm"
+WORKPIECE_KEYS = ("name", "tangential_coefficient_mpa", "radial_ratio", "axial_ratio", *_EDGES, *_SPREADS, _UNTOLD_EDGE)
 
 
 def workpiece_of(table: Table) -> Workpiece:
@@ -31,7 +32,8 @@ def workpiece_of(table: Table) -> Workpiece:
         *(table.quantity(key, EDGE, 0.0) * unit for key, unit in _EDGES.items()),
         *(table.number(key, "%", 100.0 * usual, least=0.0, most=100.0) / 100.0 for key, usual in _SPREADS.items()),
     )
-    return Workpiece(table.text("name"), coefficients)
+    usual = Workpiece("", _USUAL).edge_force_spread
+    return Workpiece(table.text("name"), coefficients, table.number(_UNTOLD_EDGE, "N/mm", usual * 1e-3, least=0.0, most=200.0) * 1e3)
 
 
 def workpiece_keys(workpiece: Workpiece, all_spreads: bool = False) -> dict[str, Any]:
@@ -48,6 +50,8 @@ def workpiece_keys(workpiece: Workpiece, all_spreads: bool = False) -> dict[str,
         data["axial_ratio"] = c.axial_ratio
     edges = (c.tangential_edge, c.radial_edge, c.axial_edge)
     data |= {key: value / unit for (key, unit), value in zip(_EDGES.items(), edges, strict=True) if value != 0.0}
+    if workpiece.edge_force_spread != Workpiece("", _USUAL).edge_force_spread:
+        data[_UNTOLD_EDGE] = workpiece.edge_force_spread * 1e-3
     spreads = zip(_SPREADS.items(), (c.tangential_spread, c.ratio_spread, c.edge_spread), strict=True)
     return data | {key: _percent(value) for (key, usual), value in spreads if all_spreads or value != usual}
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
-from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
@@ -33,9 +34,17 @@ class KnownTip(TipSource):
     ----------
     known : Receptance or TipModes
         Over ``tip.x`` and ``tip.y``.
+    coefficients : CuttingCoefficients or None
+        Of what is cut, where the modes' file tells them.
     """
 
     known: Receptance | TipModes
+    coefficients: CuttingCoefficients | None = None
+
+    @property
+    def workpiece(self) -> Workpiece | None:
+        """What the coefficients are of, where they are known."""
+        return None if self.coefficients is None else Workpiece("of the modes' file", self.coefficients)
 
     @property
     def band(self) -> None:

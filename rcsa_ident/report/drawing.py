@@ -15,7 +15,7 @@ from rcsa_ident.tool_holder.geometry import BeamSegment
 #: Drawn on a paper of its own, so that it reads on a light page and on a dark one.
 _STYLE = """
 .rt{--paper:#fff;--ink:#1b2430;--soft:#7a8694;--tool:#c9d3de;--steel:#dfe4ea;--hatch:#9aa7b5;--contact:#d1495b}
-@media (prefers-color-scheme:dark){.rt{--paper:#14181d;--ink:#e6ebf0;--soft:#93a0ad;--tool:#46566a;--steel:#2b343f;--hatch:#66788a;
+@media (prefers-color-scheme:dark){.rt{--paper:#161c22;--ink:#e6ebf0;--soft:#93a0ad;--tool:#46566a;--steel:#2b343f;--hatch:#66788a;
 --contact:#ff7b8a}}
 .rt .paper{fill:var(--paper)}.rt .tool{fill:var(--tool);stroke:var(--ink)}.rt .holder{fill:url(#rt-hatch);stroke:var(--ink)}
 .rt .edge{fill:none;stroke:var(--ink)}.rt .hidden{fill:none;stroke:var(--ink)}.rt .axis,.rt .line{fill:none;stroke:var(--soft)}

@@ -41,6 +41,15 @@ def order_sums(samples, step, highest):
     return (real + 1j * imaginary).T.copy()
 
 
+@numba.njit(cache=True, inline="always")
+def turn_on(power, quadrature, cosine, sine):
+    """Turn powers of an angle's cosine and sine on to the next order, in place."""
+    for t in range(power.size):
+        further = power[t] * cosine[t] - quadrature[t] * sine[t]
+        quadrature[t] = power[t] * sine[t] + quadrature[t] * cosine[t]
+        power[t] = further
+
+
 @numba.njit(cache=True)
 def order_signal(amplitude, step, n):
     """Return Re sum_m amplitude[m] e^{i m step t'} with t' from the middle of n samples, shape (m + 1, c) -> (n, c)."""
@@ -60,10 +69,7 @@ def order_signal(amplitude, step, n):
                 out = values[c, start : start + size]
                 for t in range(size):
                     out[t] += a * power[t] - b * quadrature[t]
-            for t in range(size):
-                turned = power[t] * cosine[t] - quadrature[t] * sine[t]
-                quadrature[t] = power[t] * sine[t] + quadrature[t] * cosine[t]
-                power[t] = turned
+            turn_on(power, quadrature, cosine, sine)
     return values.T.copy()
 
 
@@ -148,39 +154,44 @@ def _level(value, length, sign, extremes, samples, runs):
 
 
 @numba.njit(cache=True)
-def angle_sums(samples, angle, starts, window, highest):
+def turned(angle):
+    """Return cosine and sine of an angle, shape (n,) -> (2, n): every order's are powers of them."""
+    turn = np.empty((2, angle.size))
+    for t in range(angle.size):
+        turn[0, t], turn[1, t] = math.cos(angle[t]), math.sin(angle[t])
+    return turn
+
+
+@numba.njit(cache=True, fastmath={"reassoc", "contract"})
+def angle_sums(samples, turn, starts, window, highest):
     """Return sum_t window[t] samples[s + t] e^{-i m angle[s + t]} of blocks that begin at `starts`, for m = 0..highest.
 
-    Shapes: samples (n, c), angle (n,), starts (b,), window (l,) -> (b, highest + 1, c).
+    Shapes: samples (n, c), `turned` angle (2, n), starts (b,), window (l,) -> (b, highest + 1, c).
     """
     blocks, length, channels = starts.size, window.size, samples.shape[1]
-    sums = np.empty((blocks, highest + 1, channels), dtype=np.complex128)
-    cosine, sine = np.ones(highest + 1), np.zeros(highest + 1)
-    real, imaginary = np.empty((channels, highest + 1)), np.empty((channels, highest + 1))
+    sums = np.zeros((blocks, highest + 1, channels), dtype=np.complex128)
+    size = min(_CHUNK, length)
+    weighted = np.empty((channels, size))
     for b in range(blocks):
-        real[:], imaginary[:] = 0.0, 0.0
-        for t in range(length):
-            place = starts[b] + t
-            first, second = math.cos(angle[place]), math.sin(angle[place])
-            for m in range(1, min(4, highest) + 1):
-                cosine[m] = cosine[m - 1] * first - sine[m - 1] * second
-                sine[m] = cosine[m - 1] * second + sine[m - 1] * first
-            for m in range(5, highest + 1):
-                cosine[m] = cosine[m - 4] * cosine[4] - sine[m - 4] * sine[4]
-                sine[m] = cosine[m - 4] * sine[4] + sine[m - 4] * cosine[4]
-            for c in range(channels):
-                x = window[t] * samples[place, c]
-                for m in range(highest + 1):
-                    real[c, m] += x * cosine[m]
-                for m in range(highest + 1):
-                    imaginary[c, m] -= x * sine[m]
-        for c in range(channels):
+        for start in range(0, length, size):
+            count, place = min(size, length - start), starts[b] + start
+            cosine, sine = turn[0, place : place + count], turn[1, place : place + count]
+            power, quadrature = np.ones(count), np.zeros(count)
+            for t in range(count):
+                for c in range(channels):
+                    weighted[c, t] = window[start + t] * samples[place + t, c]
             for m in range(highest + 1):
-                sums[b, m, c] = real[c, m] + 1j * imaginary[c, m]
+                for c in range(channels):
+                    row, real, imaginary = weighted[c], 0.0, 0.0
+                    for t in range(count):
+                        real += row[t] * power[t]
+                        imaginary -= row[t] * quadrature[t]
+                    sums[b, m, c] += complex(real, imaginary)
+                turn_on(power, quadrature, cosine, sine)
     return sums
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath={"reassoc", "contract"})
 def told_angles(lines, order, phase, reach):
     """Return what lines tell of an angle beyond `phase`, weighted by its information, and that [1/rad^2].
 
@@ -189,61 +200,99 @@ def told_angles(lines, order, phase, reach):
     `reach` blocks to both sides of it, of all where the reach is longer than half of them; its variance is what lines differ from theirs.
     """
     rows, blocks = lines.shape
-    step, power = np.exp(-1j * phase), np.ones(blocks, dtype=np.complex128)
-    told, information = np.zeros(blocks), np.full(blocks, 1e-300)
-    turned, mean, total = np.empty(blocks, np.complex128), np.empty(blocks, np.complex128), np.empty(blocks + 1, np.complex128)
     everywhere = reach > 0.5 * blocks
     wide = 0 if everywhere else max(round(reach), 1)
-    total[0] = 0.0
+    cosine, sine, power, quadrature = np.cos(phase), -np.sin(phase), np.ones(blocks), np.zeros(blocks)
+    told, information = np.zeros(blocks), np.full(blocks, 1e-300)
+    own, mean, total = np.empty((2, blocks)), np.empty((2, blocks)), np.zeros((2, blocks + 1))
+    first, last, share = np.empty(blocks, np.int64), np.empty(blocks, np.int64), np.empty(blocks)
+    for b in range(blocks):
+        first[b], last[b] = (0, blocks) if everywhere else (max(b - wide, 0), min(b + wide + 1, blocks))
+        share[b] = 1.0 / (last[b] - first[b])
     for k in range(rows):
         for _ in range(order[k] - (order[k - 1] if k else 0)):
-            for b in range(blocks):
-                power[b] *= step[b]
+            turn_on(power, quadrature, cosine, sine)
         for b in range(blocks):
-            turned[b] = lines[k, b] * power[b]
-            total[b + 1] = total[b] + turned[b]
+            at = lines[k, b]
+            own[0, b] = at.real * power[b] - at.imag * quadrature[b]
+            own[1, b] = at.real * quadrature[b] + at.imag * power[b]
         for b in range(blocks):
-            first, last = (0, blocks) if everywhere else (max(b - wide, 0), min(b + wide + 1, blocks))
-            mean[b] = (total[last] - total[first]) / (last - first)
+            total[0, b + 1] = total[0, b] + own[0, b]
+            total[1, b + 1] = total[1, b] + own[1, b]
         square = 0.0
         for b in range(blocks):
-            off = turned[b] - mean[b]
-            square += off.real * off.real + off.imag * off.imag
-        noise = 0.5 * square / blocks + 1e-300
+            mean[0, b] = (total[0, last[b]] - total[0, first[b]]) * share[b]
+            mean[1, b] = (total[1, last[b]] - total[1, first[b]]) * share[b]
+            square += (own[0, b] - mean[0, b]) ** 2 + (own[1, b] - mean[1, b]) ** 2
+        weight = order[k] / (0.5 * square / blocks + 1e-300)
         for b in range(blocks):
-            at, about = turned[b], mean[b]
-            told[b] += order[k] / noise * (about.real * at.imag - about.imag * at.real)
-            information[b] += order[k] ** 2 / noise * (about.real * about.real + about.imag * about.imag)
+            told[b] += weight * (mean[0, b] * own[1, b] - mean[1, b] * own[0, b])
+            information[b] += weight * order[k] * (mean[0, b] ** 2 + mean[1, b] ** 2)
     return told, information
 
 
 @numba.njit(cache=True)
-def angle_signal(amplitude, angle, length):
+def walked(values, information, price):
+    """Return y, where sum(information (values - y)^2) + price sum(second differences of y)^2 is least, and the logarithm of that fit's
+    likelihood, the values' own factor left out; not a number where rounding leaves nothing to solve.
+
+    Shapes: values (n,), information (n,) -> (n,), (); n is 3 or more.
+    """
+    n = values.size
+    # Cholesky's factor of five diagonals, its inverse first diagonal
+    inverse, first, second, y = np.empty(n), np.zeros(n), np.zeros(n), np.empty(n)
+    logarithms = 0.0
+    for t in range(n):
+        own = (t < n - 2) + 4.0 * (0 < t < n - 1) + (t > 1)
+        pivot, right = price * own + information[t], information[t] * values[t]
+        if t > 1:
+            second[t] = price * inverse[t - 2]
+            pivot -= second[t] * second[t]
+            right -= second[t] * y[t - 2]
+        if t > 0:
+            beside = -2.0 * ((t < n - 1) + (t > 1))
+            first[t] = (price * beside - second[t] * first[t - 1]) * inverse[t - 1]
+            pivot -= first[t] * first[t]
+            right -= first[t] * y[t - 1]
+        pivot = math.sqrt(pivot) if pivot > 0.0 else math.nan
+        inverse[t] = 1.0 / pivot
+        logarithms += math.log(pivot)
+        y[t] = right * inverse[t]
+    for t in range(n - 1, -1, -1):
+        if t < n - 1:
+            y[t] -= first[t + 1] * y[t + 1]
+        if t < n - 2:
+            y[t] -= second[t + 2] * y[t + 2]
+        y[t] *= inverse[t]
+    cost = 0.0
+    for t in range(n):
+        off, bend = values[t] - y[t], y[t] - 2.0 * y[t - 1] + y[t - 2] if t > 1 else 0.0
+        cost += information[t] * off * off + price * bend * bend
+    return y, 0.5 * (n - 2) * math.log(price) - logarithms - 0.5 * cost
+
+
+@numba.njit(cache=True, fastmath={"reassoc", "contract"})
+def angle_signal(amplitude, turn, length):
     """Return Re sum_m amplitude[w, m] e^{i m angle[t]} over windows of `length` samples that follow each other.
 
-    Shapes: amplitude (w, m + 1, c), angle (n,) -> (w length, c).
+    Shapes: amplitude (w, m + 1, c), `turned` angle (2, n) -> (w length, c).
     """
     windows, orders, channels = amplitude.shape
     values = np.zeros((windows * length, channels))
     size = min(_CHUNK, length)
-    cosine, sine, power, quadrature = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
     out = np.empty((channels, size))
     for w in range(windows):
         for start in range(w * length, (w + 1) * length, size):
             count = min(size, (w + 1) * length - start)
-            for t in range(count):
-                cosine[t], sine[t] = math.cos(angle[start + t]), math.sin(angle[start + t])
-                power[t], quadrature[t] = 1.0, 0.0
+            cosine, sine = turn[0, start : start + count], turn[1, start : start + count]
+            power, quadrature = np.ones(count), np.zeros(count)
             out[:] = 0.0
             for m in range(orders):
                 for c in range(channels):
                     a, b = amplitude[w, m, c].real, amplitude[w, m, c].imag
                     for t in range(count):
                         out[c, t] += a * power[t] - b * quadrature[t]
-                for t in range(count):
-                    turned = power[t] * cosine[t] - quadrature[t] * sine[t]
-                    quadrature[t] = power[t] * sine[t] + quadrature[t] * cosine[t]
-                    power[t] = turned
+                turn_on(power, quadrature, cosine, sine)
             for c in range(channels):
                 for t in range(count):
                     values[start + t, c] = out[c, t]

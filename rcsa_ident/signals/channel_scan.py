@@ -95,7 +95,9 @@ class _Runs:
         if length >= 4.0 * FROZEN_SAMPLES and length >= 4.0 * self.counts[13]:
             return start, length
         kept = self.front[1:]
-        kept = kept[(kept[:, 1] >= max(FROZEN_SAMPLES, 4.0 * _quantile(self.lengths, 0.97))) & (kept[:, 2] > 1.5 * self.values[5])]
+        kept = kept[(kept[:, 1] >= FROZEN_SAMPLES) & (kept[:, 2] > 1.5 * self.values[5])]
+        # of most channels nothing is left by now
+        kept = kept[kept[:, 1] >= 4.0 * _quantile(self.lengths, 0.97)] if kept.size else kept
         if not kept.size:
             return None
         longest = kept[int(np.argmax(kept[:, 1]))]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import rfft
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals.steady_part import hann
 
 #: Length of the windows in which the speed is followed [s].
 WINDOW = 0.5
+#: Bins of a window's spectrum for each of its samples' own: it is padded with zeros.
+PADDED = 4
 #: The noise is the median over bands of this width [Hz].
 _SPACING = 40.0
 #: Lines below this share of the strongest one's power do not count: belts and bearings turn at other speeds.
@@ -18,35 +21,60 @@ _RANGE = 1e-4
 _VISIBLE, _MOST_GAIN = 6.0, 4.0
 
 
-def line_gain(samples: FloatArray, rate: float, length: int) -> tuple[FloatArray, FloatArray]:
-    """Return what a line in each bin is worth in the channel where it stands out most, in windows that overlap by half.
+class LineGains:
+    """What lines are worth in the windows of a record, computed once for each length of the windows.
 
     Parameters
     ----------
     samples : array, shape (n, c)
     rate : float [Hz]
-    length : int
-        Samples of a window, at most n; the spectra are padded to four times as many.
-
-    Returns
-    -------
-    gain : array, shape (w, b)
-        Logarithms, of bins from 0 to half the rate.
-    middles : array, shape (w,)
-        Samples from the first one to the windows' middles.
     """
-    starts = np.arange(0, samples.shape[0] - length + 1, max(length // 2, 1))
-    padded = 4 * length
-    gain = np.zeros((starts.size, padded // 2 + 1))
-    bins = np.arange(gain.shape[1])
-    window, width = hann(length)[:, None], min(max(round(_SPACING * padded / rate), 16), bins.size)
-    for w, start in enumerate(starts):
-        part = samples[start : start + length]
-        power = np.abs(np.fft.rfft((part - part.mean(axis=0)) * window, padded, axis=0)) ** 2
-        noise = np.median(power[: width * (bins.size // width)].reshape(-1, width, power.shape[1]), axis=1) / np.log(2.0)
-        middles = (np.arange(noise.shape[0]) + 0.5) * width
-        ratio = np.full(bins.size, 1e-300)
-        for c in range(power.shape[1]):
-            ratio = np.maximum(ratio, power[:, c] / (np.interp(bins, middles, noise[:, c]) + _RANGE * power[:, c].max() + 1e-300))
-        gain[w] = np.clip(np.log(ratio / _VISIBLE), -1.0, _MOST_GAIN)
-    return gain, starts + 0.5 * (length - 1)
+
+    def __init__(self, samples: FloatArray, rate: float) -> None:
+        self.samples, self.rate = samples, rate
+        self._found: dict[int, tuple[FloatArray, FloatArray]] = {}
+
+    def of(self, length: int) -> tuple[FloatArray, FloatArray]:
+        """Return what a line in each bin is worth in the channel where it stands out most, and the power in it of all channels.
+
+        Parameters
+        ----------
+        length : int
+            Samples of a window, at most n; windows overlap by half, and their spectra are padded to `PADDED` times as many samples.
+
+        Returns
+        -------
+        gain : array, shape (w, b)
+            Logarithms, of bins from 0 to half the rate.
+        power : array, shape (b,)
+            Sum over windows and channels.
+        """
+        if length not in self._found:
+            window, rows, total = hann(length), [], np.zeros(PADDED * length // 2 + 1)
+            for start in self._starts(length):
+                part = self.samples[start : start + length].T
+                spectrum = rfft((part - part.mean(axis=1, keepdims=True)) * window, PADDED * length)
+                power = spectrum.real**2 + spectrum.imag**2
+                total += power.sum(axis=0)
+                rows.append(self._worth(power))
+            self._found[length] = np.array(rows), total
+        return self._found[length]
+
+    def middles(self, length: int) -> FloatArray:
+        """Return the samples from the first one to the middles of the windows of a length, shape (w,)."""
+        return self._starts(length) + 0.5 * (length - 1)
+
+    def _starts(self, length: int) -> np.ndarray:
+        return np.arange(0, self.samples.shape[0] - length + 1, max(length // 2, 1))
+
+    def _worth(self, power: FloatArray) -> FloatArray:
+        """What a line in each bin is worth, of the power in it, shape (c, b) -> (b,)."""
+        channels, bins = power.shape
+        width = min(max(round(_SPACING * 2 * (bins - 1) / self.rate), 16), bins)
+        bands = power[:, : width * (bins // width)].reshape(channels, -1, width)
+        noise, at = np.median(bands, axis=2) / np.log(2.0), np.arange(bins)
+        middles = (np.arange(bands.shape[1]) + 0.5) * width
+        ratio = np.full(bins, 1e-300)
+        for own, floor in zip(power, noise, strict=True):
+            ratio = np.maximum(ratio, own / (np.interp(at, middles, floor) + _RANGE * own.max() + 1e-300))
+        return np.clip(np.log(ratio / _VISIBLE), -1.0, _MOST_GAIN)

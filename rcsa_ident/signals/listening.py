@@ -16,7 +16,7 @@ from rcsa_ident.signals.loud_part import BAND, decimated, loud_part
 from rcsa_ident.signals.off_orders import OffOrders, off_orders
 from rcsa_ident.signals.order_lines import FOLDED_ORDERS, UNFILTERED, OrderLines, order_lines
 from rcsa_ident.signals.recording import Quantity
-from rcsa_ident.signals.rotation import Rotation
+from rcsa_ident.signals.rotation import Rotation, follow_on
 from rcsa_ident.signals.speed_search import APART, HIGHEST_SHARE, TURNS, find_rotation, window_length
 from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.units import from_hz, to_hz, to_rpm
@@ -224,9 +224,9 @@ def listen(
         words = "there are no lines at the multiples of one frequency: the spindle does not turn, or is not heard"
         return replace(nothing, verdict=Heard.NO_CUT, reasons=(words,))
     fold = rate < UNFILTERED and quantity is not Quantity.SOUND
-    lines, folded = _lines(part, rate, band, found.rotation, fold)
+    lines, rotation, folded = _lines(part, rate, band, found.rotation, fold)
     answer = replace(nothing, other_speeds=tuple(from_hz(each) for each in found.others), folded=folded, explained_share=lines.explained)
-    return _judged(answer, part, rate, lines, found.rotation, quantity, teeth, between or _around(found.rotation), fold)
+    return _judged(answer, part, rate, lines, rotation, quantity, teeth, between or _around(rotation), fold)
 
 
 def _search(spindle_speed: float | None, between: tuple[float, float] | None) -> tuple[float, float]:
@@ -246,8 +246,8 @@ def _around(rotation: Rotation) -> tuple[float, float]:
     return _SLOWEST * rotation.spindle_speed, _FASTEST * rotation.spindle_speed
 
 
-def _lines(part: FloatArray, rate: float, band: float, rotation: Rotation, fold: bool) -> tuple[OrderLines, bool]:
-    """The lines of the orders, and whether such stand folded back among them."""
+def _lines(part: FloatArray, rate: float, band: float, rotation: Rotation, fold: bool) -> tuple[OrderLines, Rotation, bool]:
+    """The lines of the orders, the rotation that explains most by them, and whether orders stand folded back among them."""
     frequency = to_hz(rotation.spindle_speed)
     length = window_length(rate, frequency, part.shape[0])
     below = max(int(min(0.49 * rate, band) / frequency), 1)
@@ -256,8 +256,10 @@ def _lines(part: FloatArray, rate: float, band: float, rotation: Rotation, fold:
         both = order_lines(part, rotation.angle, length, FOLDED_ORDERS)
         # both per degree of freedom: more orders explain no more of noise
         if both.explained > plain.explained + _FOLDED_GAIN:
-            return both, True
-    return plain, False
+            closer = follow_on(part, rotation, FOLDED_ORDERS)
+            again = order_lines(part, closer.angle, length, FOLDED_ORDERS)
+            return (again, closer, True) if again.explained > both.explained else (both, rotation, True)
+    return plain, rotation, False
 
 
 def _judged(
@@ -303,7 +305,7 @@ def _beside(part: FloatArray, rate: float, lines: OrderLines, rotation: Rotation
     """Lines beside the orders of a part."""
     order = np.arange(1, lines.power.size)
     apparent = np.abs((order * to_hz(rotation.spindle_speed) + 0.5 * rate) % rate - 0.5 * rate)
-    return off_orders(lines.rest, _typical(part, rate), rate, apparent, band, quantity is Quantity.ACCELERATION)
+    return off_orders(lines.rest(part, rotation.angle), _typical(part, rate), rate, apparent, band, quantity is Quantity.ACCELERATION)
 
 
 def _chatters(beside: OffOrders, lines: OrderLines) -> bool:
@@ -322,7 +324,7 @@ def heard_in_a_cut(part: FloatArray, rate: float, rotation: Rotation, teeth: int
         Of the spindle in it.
     teeth : int
     """
-    lines, _ = _lines(part, rate, min(BAND, 0.5 * rate), rotation, rate < UNFILTERED)
+    lines, rotation, _ = _lines(part, rate, min(BAND, 0.5 * rate), rotation, rate < UNFILTERED)
     beside = _beside(part, rate, lines, rotation, min(BAND, 0.5 * rate), Quantity.ACCELERATION)
     spindle = f"{to_hz(rotation.spindle_speed):.1f} Hz"
     if _chatters(beside, lines):

@@ -68,7 +68,7 @@ def decimated(samples: FloatArray, rate: float) -> tuple[FloatArray, float, floa
     while padded % factor:
         padded = next_fast_len(padded + 1, real=True)
     few = padded // factor
-    out = np.empty((n // factor, samples.shape[1]))
+    out = np.empty((samples.shape[1], n // factor)).T
     bins = np.arange(few // 2 + 1) * rate / padded
     # a soft edge above the band, so that nothing rings
     edge = 0.5 * (1.0 + np.cos(np.pi * np.clip((bins - BAND) / (0.49 * rate / factor - BAND), 0.0, 1.0)))

@@ -63,7 +63,8 @@ def off_orders(rest: FloatArray, energy: float, rate: float, orders: FloatArray,
     length = min(round(_WINDOW * rate), n)
     window = hann(length)[:, None]
     starts = np.arange(0, n - length + 1, max(length // 2, 1))
-    power = np.array([np.abs(np.fft.rfft(rest[s : s + length] * window, axis=0)) ** 2 for s in starts])
+    spectra = (np.fft.rfft(rest[s : s + length] * window, axis=0) for s in starts)
+    power = np.array([each.real**2 + each.imag**2 for each in spectra])
     # the transients of an entry or a knock are in few windows, chatter is in most
     level = np.sum(power, axis=(1, 2))
     power = power[level <= _TRANSIENT * np.median(level)].mean(axis=0) * (2.0 / (length * np.sum(window**2)))

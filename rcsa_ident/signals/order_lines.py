@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.signals._kernels import angle_signal, angle_sums
+from rcsa_ident.signals._kernels import angle_signal, angle_sums, turned
 
 #: Rate below which a recorder of motion is taken to have no filter against folding [Hz], and the highest order that is looked for then.
 UNFILTERED, FOLDED_ORDERS = 10e3, 30
@@ -29,14 +29,27 @@ class OrderLines:
         Share of the variance about the windows' means that the fits explain, both per degree of freedom.
     energy : float
         Mean square about the means, all channels together.
-    rest : array, shape (n, c)
-        What the fits leave; the samples behind the last window are left out.
+    amplitude : complex array, shape (w, m + 1, c)
+        Re sum_m amplitude[w, m] e^{i m angle} is what is fitted in each window.
+    length : int
+        Samples of a window.
     """
 
     power: FloatArray
     explained: float
     energy: float
-    rest: FloatArray
+    amplitude: ComplexArray
+    length: int
+
+    def rest(self, samples: FloatArray, angle: FloatArray) -> FloatArray:
+        """Return what the fits leave of the samples that they were fitted to, shape (w length, c).
+
+        Parameters
+        ----------
+        samples : array, shape (n, c)
+        angle : array, shape (n,) [rad]
+        """
+        return _centred(samples, self.length) - angle_signal(self.amplitude, turned(angle), self.length)
 
 
 def order_lines(samples: FloatArray, angle: FloatArray, length: int, highest: int) -> OrderLines:
@@ -53,16 +66,15 @@ def order_lines(samples: FloatArray, angle: FloatArray, length: int, highest: in
     highest : int
         Highest order.
     """
-    n, channels = samples.shape
+    n = samples.shape[0]
     starts = np.arange(0, n - length + 1, length)
-    windows, flat = starts.size, np.ones(length)
-    centred = samples[: windows * length].reshape(windows, length, channels)
-    centred = (centred - centred.mean(axis=1, keepdims=True)).reshape(windows * length, channels)
+    windows, flat, turn = starts.size, np.ones(length), turned(angle)
+    centred = _centred(samples, length)
     # unknowns of a window are complex exponentials of the orders -m to m, whose products are exponentials of twice as many orders
-    products = _both_sides(angle_sums(np.ones((n, 1)), angle, starts, flat, 2 * highest))[:, :, 0]
+    products = _both_sides(angle_sums(np.ones((n, 1)), turn, starts, flat, 2 * highest))[:, :, 0]
     order = np.arange(2 * highest + 1)
     matrix = products[:, order[:, None] - order[None, :] + 2 * highest]
-    sums = _both_sides(angle_sums(centred, angle, starts, flat, highest))
+    sums = _both_sides(angle_sums(centred, turn, starts, flat, highest))
     if highest * (angle[-1] - angle[0]) < np.pi * n:
         solution, used = np.linalg.solve(matrix, sums), order.size * windows
     else:
@@ -75,8 +87,14 @@ def order_lines(samples: FloatArray, angle: FloatArray, length: int, highest: in
     share = 1.0 - left / (energy / (windows * (length - 1)) + 1e-300)
     amplitude = solution[:, highest:]
     weights = np.where(np.arange(highest + 1) == 0, 1.0, 2.0)[None, :, None]
-    rest = centred - angle_signal(np.ascontiguousarray(weights * amplitude), angle, length)
-    return OrderLines(_steady_power(amplitude), share, energy / (windows * length), rest)
+    return OrderLines(_steady_power(amplitude), share, energy / (windows * length), weights * amplitude, length)
+
+
+def _centred(samples: FloatArray, length: int) -> FloatArray:
+    """Samples about the mean of each window; those behind the last window are left out."""
+    windows = samples.shape[0] // length
+    parts = samples[: windows * length].reshape(windows, length, -1)
+    return np.ascontiguousarray(np.reshape(parts - parts.mean(axis=1, keepdims=True), (windows * length, -1)))
 
 
 def _both_sides(sums: ComplexArray) -> ComplexArray:

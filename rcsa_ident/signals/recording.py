@@ -71,6 +71,11 @@ class Sensor:
         spindle's housing (see `Recording.accelerometer`).
     mount_resonance : float or None [Hz]
         Of the sensor on its mount, a magnet or wax: below it motion is shown too large, by 1 / (1 - (f / resonance)^2).
+    gain_spread, cross_talk_spread : float [-]
+        Standard deviations of the gain's logarithm, and of the share that a displacement sensor feels of the other axis' motion. They
+        count where something of the campaign's drawings is not exact, too.
+    delay_spread : float [s]
+        Standard deviation of the delay; likewise.
     rotation : float [rad]
         Of the direction that it measures from its axis, about the spindle's, from +X towards +Y.
 
@@ -94,6 +99,9 @@ class Sensor:
     role: Role | None = None
     mount_resonance: float | None = None
     rotation: float = 0.0
+    gain_spread: float = 0.02
+    cross_talk_spread: float = 0.015
+    delay_spread: float = 5e-6
 
     def __post_init__(self) -> None:
         # a dynamometer also feels along the spindle

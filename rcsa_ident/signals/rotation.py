@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles
-from rcsa_ident.signals.line_gain import WINDOW, line_gain
+from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles, turned, walked
+from rcsa_ident.signals.line_gain import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.steady_part import hann
+from rcsa_ident.units import to_hz
 
 #: Orders that are looked at.
 ORDERS = 40
@@ -19,6 +20,8 @@ ORDERS = 40
 _LARGEST_CHANGE = 7.5
 #: Revolutions of the blocks in which the angle is followed, and their least length [s].
 _BLOCK_TURNS, _SHORTEST_BLOCK = 4.0, 0.012
+#: Blocks below which no more is told than was known.
+_FEWEST_BLOCKS = 4
 #: Times over which the lines' amplitudes are taken as one [s], one after the other: neighbours are brought into line before what lies
 #: farther apart, and at last all of the record, since what turns all orders in proportion is the spindle.
 _AMPLITUDE_TIMES = (0.25, 1.0, 4.0, np.inf)
@@ -121,15 +124,15 @@ class Pace:
 WANDER, RAMP = Pace(), Pace(0.25, 8e-3, 1e-3)
 
 
-def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
+def speed_path(heard: LineGains, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
     """Return the likeliest path of the spindle's frequency through windows that overlap by half.
 
     In each window a trial frequency is worth what lines at its multiples are worth; from one window to the next it changes little.
 
     Parameters
     ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
+    heard : LineGains
+        Of the record.
     lowest, highest : float [Hz]
         Where it is looked for.
     pace : Pace
@@ -140,12 +143,11 @@ def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, 
         Samples from the first one to the windows' middles.
     frequency : array, shape (w,) [Hz]
     """
-    length = pace.length(rate, lowest, samples.shape[0])
-    gain, middles = line_gain(samples, rate, length)
+    length = pace.length(heard.rate, lowest, heard.samples.shape[0])
     trial = np.exp(np.arange(np.log(lowest), np.log(highest) + pace.step, pace.step))
-    scores = comb_scores(gain, trial * 4.0 * length / rate, ORDERS, False)
+    scores = comb_scores(heard.of(length)[0], trial * PADDED * length / heard.rate, ORDERS, False)
     path, _ = best_path(scores, max(round(_LARGEST_CHANGE * pace.change / pace.step), 1), 0.5 * (pace.step / pace.change) ** 2)
-    return middles, trial[path]
+    return heard.middles(length), trial[path]
 
 
 def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: FloatArray, teeth: int = 0) -> Rotation:
@@ -166,39 +168,90 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
         Where the speed changes on purpose: of the cutter whose orders do not take part, since then they carry the structure's phase; 1
         where all do. 0 where the speed only wanders.
     """
-    at, mean = np.arange(samples.shape[0]), float(frequency.mean())
-    speed = np.full(at.size, mean)
+    angle, mean, highest = _expected(samples.shape[0], rate, middles, frequency)
+    centred = np.ascontiguousarray(samples - samples.mean(axis=0))
+    # where the speed runs away from what windows tell, low orders say where the high ones' turns begin
+    for orders in (2, 8) if teeth else ():
+        angle = _told(centred, rate, angle, mean, min(orders, highest), teeth).rotation(rate, angle).angle
+    return _told(centred, rate, angle, mean, highest, teeth).rotation(rate, angle)
+
+
+def follow_on(samples: FloatArray, rotation: Rotation, highest: int) -> Rotation:
+    """Return a rotation that is told by orders above half the sampling rate as well, where they stand folded back.
+
+    Their phases turn faster than those of the orders below, and show errors of the angle that these do not.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rotation : Rotation
+        As the orders below half the rate tell it.
+    highest : int
+        Highest order.
+    """
+    centred = np.ascontiguousarray(samples - samples.mean(axis=0))
+    told = _told(centred, rotation.rate, rotation.angle, to_hz(rotation.spindle_speed), highest, 0)
+    return replace(told.rotation(rotation.rate, rotation.angle), evidence=rotation.evidence)
+
+
+def follow_changes(samples: FloatArray, rate: float, frequency: float) -> Rotation | None:
+    """Return the spindle's angle at each sample, as `follow` tells it about one speed; None where the record does not say that it changes.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rate : float [Hz]
+    frequency : float [Hz]
+        The spindle's, to within a few hundredths of a turn over the record.
+    """
+    angle, mean, highest = _expected(samples.shape[0], rate, np.zeros(1), np.array([frequency]))
+    told = _told(np.ascontiguousarray(samples - samples.mean(axis=0)), rate, angle, mean, highest, 0)
+    return told.rotation(rate, angle) if told.evidence > _EVIDENT else None
+
+
+def _expected(n: int, rate: float, middles: FloatArray, frequency: FloatArray) -> tuple[FloatArray, float, int]:
+    """The spindle's angle at n samples by the speed in windows [rad], its mean frequency [Hz], and the highest order that is looked at."""
+    at, mean = np.arange(n), float(frequency.mean())
+    speed = np.full(n, mean)
     if middles.size > 1:
         speed = PchipInterpolator(middles, frequency)(np.clip(at, middles[0], middles[-1]))
     angle = 2.0 * np.pi / rate * np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
-    highest = max(min(int(0.45 * rate / float(frequency.max())), ORDERS), 1)
-    centred = samples - samples.mean(axis=0)
-    # where the speed runs away from what windows tell, low orders say where the high ones' turns begin
-    for orders in (2, 8) if teeth else ():
-        angle = _followed(centred, rate, angle, mean, min(orders, highest), teeth).angle
-    return _followed(centred, rate, angle, mean, highest, teeth)
+    return angle, mean, max(min(int(0.45 * rate / float(frequency.max())), ORDERS), 1)
 
 
-def _followed(samples: FloatArray, rate: float, angle: FloatArray, mean: float, highest: int, teeth: int) -> Rotation:
-    """The rotation that a spindle's orders tell beyond an angle that is about right; its mean frequency [Hz] sets the blocks."""
-    at = np.arange(samples.shape[0])
-    length = min(round(max(_BLOCK_TURNS / mean, _SHORTEST_BLOCK) * rate), at.size)
+class _Told(NamedTuple):
+    """What the orders tell of the angle in blocks: their middles [s], phase beyond the expected angle [rad], its information [1/rad^2],
+    and the evidence that the speed changes; no more than was known where blocks are few."""
+
+    time: FloatArray
+    phase: FloatArray
+    information: FloatArray
+    evidence: float
+
+    def rotation(self, rate: float, angle: FloatArray) -> Rotation:
+        """The rotation, given the expected angle."""
+        if self.time.size < _FEWEST_BLOCKS:
+            return Rotation(rate, angle, np.array([0.0, (angle.size - 1) / rate]), np.ones(2))
+        at = np.arange(angle.size) / rate
+        spline = CubicSpline(self.time, self.phase, bc_type="natural")
+        inside = np.clip(at, self.time[0], self.time[-1])
+        # beyond the blocks' middles the speed goes on as it is there
+        angle = angle + spline(inside) + spline(inside, 1) * (at - inside)
+        return Rotation(rate, angle - angle[0], self.time, self.information, self.evidence)
+
+
+def _told(samples: FloatArray, rate: float, angle: FloatArray, mean: float, highest: int, teeth: int) -> _Told:
+    """What a spindle's orders tell beyond an angle that is about right; its mean frequency [Hz] sets the blocks."""
+    n = samples.shape[0]
+    length = min(round(max(_BLOCK_TURNS / mean, _SHORTEST_BLOCK) * rate), n)
     hop = max(length // 2, 1)
-    starts = np.arange(0, at.size - length + 1, hop)
+    starts = np.arange(0, n - length + 1, hop)
     window = hann(length)
-    lines = angle_sums(samples, angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
+    lines = angle_sums(samples, turned(angle), starts, 2.0 / window.sum() * window, highest)[:, 1:]
     order = np.arange(1, highest + 1)
     own = order % teeth != 0 if teeth > 1 else order > 0
     phase, information, evidence = _common_phase(lines[:, own], order[own], hop / rate)
-    time = (starts + 0.5 * (length - 1)) / rate
-    if starts.size < 4:
-        # no more is told than was known
-        return Rotation(rate, angle, np.array([0.0, (at.size - 1) / rate]), np.ones(2))
-    spline = CubicSpline(time, phase, bc_type="natural")
-    inside = np.clip(at / rate, time[0], time[-1])
-    # beyond the blocks' middles the speed goes on as it is there
-    angle = angle + spline(inside) + spline(inside, 1) * (at / rate - inside)
-    return Rotation(rate, angle - angle[0], time, information, evidence)
+    return _Told((starts + 0.5 * (length - 1)) / rate, phase, information, evidence if starts.size >= _FEWEST_BLOCKS else 0.0)
 
 
 def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[FloatArray, FloatArray, float]:
@@ -224,22 +277,9 @@ def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[
 def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: float | None) -> tuple[FloatArray, float, float]:
     """Phases whose speed walks at random, the density of its steps (as told, or under which they are likeliest), and by how much they are
     likelier under it than under the least."""
-    n = phase.size
-    # squares of second differences: D'D has five diagonals
-    diagonal, first, second = np.zeros(n), np.zeros(n), np.zeros(n)
-    diagonal[:-2] += 1.0
-    diagonal[1:-1] += 4.0
-    diagonal[2:] += 1.0
-    first[1 : n - 1] -= 2.0
-    first[2:] -= 2.0
-    second[2:] = 1.0
     best, likeliest, least, chosen = phase, -np.inf, -np.inf, 0.0
     for each in _DENSITIES if density is None else (density,):
-        scale = 1.0 / (each * step**3)
-        factor = cholesky_banded(np.array([scale * second, scale * first, scale * diagonal + information]))
-        smooth = cho_solve_banded((factor, False), information * phase)
-        cost = np.sum(information * (phase - smooth) ** 2) + scale * np.sum(np.diff(smooth, 2) ** 2)
-        likelihood = -0.5 * (cost + 2.0 * np.sum(np.log(factor[2])) - (n - 2) * np.log(scale))
+        smooth, likelihood = walked(phase, information, 1.0 / (each * step**3))
         least = max(least, likelihood) if each == _DENSITIES[0] else least
         if likelihood > likeliest:
             best, likeliest, chosen = smooth, likelihood, float(each)

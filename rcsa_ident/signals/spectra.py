@@ -10,7 +10,7 @@ from scipy.fft import next_fast_len
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals._kernels import angle_signal, angle_sums, order_signal, order_sums
+from rcsa_ident.signals._kernels import angle_signal, angle_sums, order_signal, order_sums, turned
 from rcsa_ident.signals.recording import BLOCK, LONGEST
 from rcsa_ident.signals.steady_part import hann
 
@@ -86,7 +86,7 @@ class _Comb(NamedTuple):
         if self.deviation is None:
             return order_sums(data, self.step, highest)
         n = data.shape[0]
-        return angle_sums(data, self.angle(n), np.zeros(1, dtype=int), np.ones(n), highest)[0]
+        return angle_sums(data, turned(self.angle(n)), np.zeros(1, dtype=int), np.ones(n), highest)[0]
 
     def products(self, n: int, highest: int) -> ComplexArray:
         """Sums over n samples of e^{i m angle}, m from -2 highest to 2 highest."""
@@ -101,7 +101,7 @@ class _Comb(NamedTuple):
         """Re sum_m amplitude[m] e^{i m angle}, shape (n, c)."""
         if self.deviation is None:
             return order_signal(amplitude, self.step, n)
-        return angle_signal(amplitude[None], self.angle(n), n)
+        return angle_signal(amplitude[None], turned(self.angle(n)), n)
 
     def part(self, start: int, length: int) -> _Comb:
         """Of samples in a row."""

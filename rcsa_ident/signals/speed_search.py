@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals._kernels import comb_scores, sideband_scores
-from rcsa_ident.signals.line_gain import WINDOW, line_gain
+from rcsa_ident.signals.line_gain import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.order_lines import OrderLines, order_lines
 from rcsa_ident.signals.rotation import ORDERS, RAMP, Rotation, follow, speed_path
-from rcsa_ident.signals.steady_part import hann
 
 #: Length of the windows in which the speed is looked for [s]: fine enough for lines that lie close.
 _LONG = 4.0
@@ -61,6 +61,20 @@ class FoundSpeed:
     others: tuple[float, ...] = ()
 
 
+class _Fit(NamedTuple):
+    """How a spindle turns that turns at about a frequency [Hz], its lines, and whether short windows followed it."""
+
+    frequency: float
+    rotation: Rotation
+    lines: OrderLines
+    followed: bool
+
+    @property
+    def explained(self) -> float:
+        """Share of the variance that lines explain which keep their phase."""
+        return float(self.lines.power.sum()) / (self.lines.energy + 1e-300)
+
+
 def window_length(rate: float, frequency: float, samples: int) -> int:
     """Return the samples of a window of the fit: half a second, or a few revolutions of a slow spindle; at most what there are."""
     return min(round(max(WINDOW, TURNS / frequency) * rate), samples)
@@ -81,45 +95,56 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
     lowest, highest : float [Hz]
     """
     spare = max(samples.shape[0] - _COMPARED, 0) // 2
-    middle = samples[spare : samples.shape[0] - spare]
-    fits = [(each, *_fitted(middle, rate, each)) for each in _candidates(middle, rate, lowest, highest)]
-    ramp = _ramp(middle, rate, lowest, highest)
-    most = max((_explained(lines) for _, _, lines in fits), default=0.0)
-    if ramp is not None and _explained(ramp[1]) > max(_RAMP_EXPLAINS, _RAMP_CLEARLY * most):
-        ramp = ramp if spare == 0 else _ramp(samples, rate, lowest, highest)
+    middle = LineGains(samples[spare : samples.shape[0] - spare], rate)
+    whole = LineGains(samples, rate) if spare else middle
+    fits = [_fitted(middle, each) for each in _candidates(middle, lowest, highest)]
+    ramp = _ramp(middle, lowest, highest)
+    most = max((fit.explained for fit in fits), default=0.0)
+    if ramp is not None and ramp.explained > max(_RAMP_EXPLAINS, _RAMP_CLEARLY * most):
+        ramp = _ramp(whole, lowest, highest) if spare else ramp
         if ramp is not None:
-            return FoundSpeed(ramp[0])
+            return FoundSpeed(ramp.rotation)
     if not fits:
         return None
-    members = [fit for fit in fits if _explained(fit[2]) >= _EXPLAINS * most] if most > _TELLS else fits[:1]
-    slowest, _, lines = min(members, key=lambda fit: fit[0])
-    times = _largest_multiple(lines.power, slowest, highest)
-    while times > 1 and _between(middle, rate, slowest, times) > _BETWEEN:
+    members = [fit for fit in fits if fit.explained >= _EXPLAINS * most] if most > _TELLS else fits[:1]
+    best = min(members, key=lambda fit: fit.frequency)
+    slowest = best.frequency
+    times = _largest_multiple(best.lines.power, slowest, highest)
+    while times > 1 and _between(middle, slowest, times) > _BETWEEN:
         times = next((part for part in range(times - 1, 1, -1) if times % part == 0), 1)
     frequency = times * slowest
-    parts = _parts(middle, rate, frequency, lowest) if most > _CLEAN else 1
-    if parts > 1 and _shares(_fitted(middle, rate, frequency / parts)[1].power, parts) > _BETWEEN:
+    parts = _parts(middle, frequency, lowest) if most > _CLEAN else 1
+    if parts > 1 and _shares(_fitted(middle, frequency / parts).lines.power, parts) > _BETWEEN:
         frequency /= parts
     # a member that the spindle's multiples do not hold explains as much by other lines
-    others = tuple(each for each, _, _ in members if each > frequency and abs(each / frequency - round(each / frequency)) > APART)
-    known = {each: rotation for each, rotation, _ in fits} if spare == 0 else {}
-    return FoundSpeed(known.get(frequency) or _fitted(samples, rate, frequency)[0], others)
+    others = tuple(
+        fit.frequency
+        for fit in members
+        if fit.frequency > frequency and abs(fit.frequency / frequency - round(fit.frequency / frequency)) > APART
+    )
+    known = {fit.frequency: fit.rotation for fit in fits} if spare == 0 else {}
+    if frequency in known:
+        return FoundSpeed(known[frequency], others)
+    if spare and best.followed:
+        # a constant speed that does not do for the middle does not for the whole
+        return FoundSpeed(follow(samples, rate, *_path(whole, frequency)), others)
+    return FoundSpeed(_fitted(whole, frequency).rotation, others)
 
 
-def _parts(samples: FloatArray, rate: float, frequency: float, lowest: float) -> int:
+def _parts(heard: LineGains, frequency: float, lowest: float) -> int:
     """Least number by which a frequency is divided so that nearly all lines stand on multiples that stand between its own: what looks like
     the spindle may be the tooth passages. Lines of other origin may stand there by chance, but do not keep the spindle's phase."""
-    shares = {parts: _between(samples, rate, frequency / parts, parts) for parts in range(2, _MOST + 3) if frequency / parts >= lowest}
+    shares = {parts: _between(heard, frequency / parts, parts) for parts in range(2, _MOST + 3) if frequency / parts >= lowest}
     most = max(shares.values(), default=0.0)
     return min(parts for parts in shares if shares[parts] > 0.9 * most) if most > _BETWEEN else 1
 
 
-def _between(samples: FloatArray, rate: float, frequency: float, times: int) -> float:
+def _between(heard: LineGains, frequency: float, times: int) -> float:
     """Share of the lines at multiples of a frequency that are no multiples of so many times it, as long windows show them: beside
     chatter, short ones do not tell weak lines."""
-    length = min(round(_LONG * rate), samples.shape[0])
-    power, order = _power(samples, length), np.arange(1, int(0.45 * rate / frequency) + 1)
-    hertz = 4.0 * length / rate
+    length = _long(heard)
+    power, order = heard.of(length)[1], np.arange(1, int(0.45 * heard.rate / frequency) + 1)
+    hertz = PADDED * length / heard.rate
     own, around = max(round(_OWN * hertz), 2), round(_AROUND * hertz)
     line = np.zeros(order.size)
     for k, at in enumerate(np.round(order * frequency * hertz).astype(int)):
@@ -129,16 +154,17 @@ def _between(samples: FloatArray, rate: float, frequency: float, times: int) -> 
     return _shares(np.concatenate([[0.0], line]), times)
 
 
-def _ramp(samples: FloatArray, rate: float, lowest: float, highest: float) -> tuple[Rotation, OrderLines] | None:
+def _ramp(heard: LineGains, lowest: float, highest: float) -> _Fit | None:
     """How a spindle turns whose speed changes on purpose, and its lines; None where no path leads far enough."""
     # a window holds a few revolutions, and is short beside the ramp
+    samples, rate = heard.samples, heard.rate
     lowest, highest = max(lowest, RAMP.slowest), min(highest, 0.2 * rate)
     if highest < (1.0 + 2.0 * APART) * lowest:
         return None
-    middles, path = speed_path(samples, rate, lowest, highest, RAMP)
+    middles, path = speed_path(heard, lowest, highest, RAMP)
     if np.ptp(np.log(path)) < 2.0 * APART:
         return None
-    gain = line_gain(samples, rate, RAMP.length(rate, lowest, samples.shape[0]))[0]
+    gain = heard.of(RAMP.length(rate, lowest, samples.shape[0]))[0]
     place = path * 2.0 * (gain.shape[1] - 1) / rate
 
     def score(parts: int) -> float:
@@ -148,9 +174,9 @@ def _ramp(samples: FloatArray, rate: float, lowest: float, highest: float) -> tu
     scores = {parts: score(parts) for parts in range(1, _MOST + 1) if path.min() / parts >= lowest}
     parts = max(parts for parts in scores if scores[parts] >= _AS_GOOD * max(scores.values()))
     slowest = float(path.max()) / parts
-    fit = _lines(samples, rate, follow(samples, rate, middles, path / parts), slowest)
-    times = _largest_multiple(fit[1].power, slowest, highest)
-    return fit if times == 1 else _lines(samples, rate, follow(samples, rate, middles, times * path / parts), times * slowest)
+    fit = _along(heard, middles, path / parts, slowest)
+    times = _largest_multiple(fit.lines.power, slowest, highest)
+    return fit if times == 1 else _along(heard, middles, times * path / parts, times * slowest)
 
 
 def rotation_near(samples: FloatArray, rate: float, frequency: float) -> Rotation:
@@ -161,23 +187,32 @@ def rotation_near(samples: FloatArray, rate: float, frequency: float) -> Rotatio
     samples : array, shape (n, c)
     rate, frequency : float [Hz]
     """
-    return _fitted(samples, rate, frequency)[0]
+    return _fitted(LineGains(samples, rate), frequency).rotation
 
 
-def _lines(samples: FloatArray, rate: float, rotation: Rotation, frequency: float) -> tuple[Rotation, OrderLines]:
-    """A rotation and the lines of its orders below half the rate."""
-    highest = min(max(int(0.48 * rate / frequency), 1), 2 * ORDERS)
-    return rotation, order_lines(samples, rotation.angle, window_length(rate, frequency, samples.shape[0]), highest)
+def _along(heard: LineGains, middles: FloatArray, frequency: FloatArray, highest: float) -> _Fit:
+    """How a spindle turns that turns as windows say, at most at a frequency [Hz], and the lines of its orders below half the rate."""
+    samples, rate = heard.samples, heard.rate
+    rotation = follow(samples, rate, middles, frequency)
+    orders = min(max(int(0.48 * rate / highest), 1), 2 * ORDERS)
+    lines = order_lines(samples, rotation.angle, window_length(rate, highest, samples.shape[0]), orders)
+    return _Fit(highest, rotation, lines, middles.size > 1)
 
 
-def _candidates(samples: FloatArray, rate: float, lowest: float, highest: float) -> list[float]:
+def _long(heard: LineGains) -> int:
+    """Samples of the windows in which the speed is looked for."""
+    return min(round(_LONG * heard.rate), heard.samples.shape[0])
+
+
+def _candidates(heard: LineGains, lowest: float, highest: float) -> list[float]:
     """Frequencies [Hz] that lines speak for, the best first; none where that may be chance."""
-    length = min(round(_LONG * rate), samples.shape[0])
-    gain = line_gain(samples, rate, length)[0].mean(axis=0)
-    trial = np.exp(np.arange(np.log(lowest), np.log(min(highest, HIGHEST_SHARE * rate)) + _STEP, _STEP))
-    place = trial * 4.0 * length / rate
+    length = _long(heard)
+    gains, power = heard.of(length)
+    gain = gains.mean(axis=0)
+    trial = np.exp(np.arange(np.log(lowest), np.log(min(highest, HIGHEST_SHARE * heard.rate)) + _STEP, _STEP))
+    place = trial * PADDED * length / heard.rate
     score = comb_scores(gain[None], place, ORDERS, False)[0]
-    score = score + np.max([sideband_scores(gain, place, float(centre), _SIDES, _WORTH) for centre in _strongest(samples, length)], axis=0)
+    score = score + np.max([sideband_scores(gain, place, float(centre), _SIDES, _WORTH) for centre in _strongest(power)], axis=0)
     found: list[int] = []
     for at in np.argsort(-score):
         if score[at] < max(_AS_GOOD * score.max(), _A_SPEED) or len(found) == _MOST:
@@ -187,39 +222,28 @@ def _candidates(samples: FloatArray, rate: float, lowest: float, highest: float)
     return [float(trial[at]) for at in found]
 
 
-def _power(samples: FloatArray, length: int) -> FloatArray:
-    """Power in the bins of `line_gain`, all windows and channels together."""
-    starts = range(0, samples.shape[0] - length + 1, max(length // 2, 1))
-    window = hann(length)[:, None]
-    parts = (samples[s : s + length] - samples[s : s + length].mean(axis=0) for s in starts)
-    power: FloatArray = np.sum([np.sum(np.abs(np.fft.rfft(part * window, 4 * length, axis=0)) ** 2, axis=1) for part in parts], axis=0)
-    return power
-
-
-def _strongest(samples: FloatArray, length: int) -> list[int]:
-    """Bins of the strongest lines, those of `line_gain`."""
-    power, found = _power(samples, length), []
+def _strongest(power: FloatArray) -> list[int]:
+    """Bins of the strongest lines."""
+    left, found = power.copy(), []
     for _ in range(_CENTRES):
-        found.append(int(np.argmax(power)))
-        power[max(found[-1] - 40, 0) : found[-1] + 41] = 0.0
+        found.append(int(np.argmax(left)))
+        left[max(found[-1] - 40, 0) : found[-1] + 41] = 0.0
     return found
 
 
-def _fitted(samples: FloatArray, rate: float, frequency: float) -> tuple[Rotation, OrderLines]:
+def _path(heard: LineGains, frequency: float) -> tuple[FloatArray, FloatArray]:
+    """Path of a speed that is about this frequency [Hz] through short windows, see `speed_path`."""
+    return speed_path(heard, (1.0 - APART) * frequency, (1.0 + APART) * frequency)
+
+
+def _fitted(heard: LineGains, frequency: float) -> _Fit:
     """How a spindle turns that turns at about this frequency, and its lines.
 
     The path through short windows knows how it wanders; where they say too little, the speed is the one that long windows tell.
     """
-    path = speed_path(samples, rate, (1.0 - APART) * frequency, (1.0 + APART) * frequency)
-    constant = np.array([0.5 * (samples.shape[0] - 1)]), np.array([frequency])
-    by_path, steady = [_lines(samples, rate, follow(samples, rate, *each), frequency) for each in (path, constant)]
-    told = _explained(by_path[1]) > max(_CLEARLY * _explained(steady[1]), _TELLS)
-    return by_path if told else steady
-
-
-def _explained(lines: OrderLines) -> float:
-    """Share of the variance that lines explain which keep their phase."""
-    return float(lines.power.sum()) / (lines.energy + 1e-300)
+    followed = _along(heard, *_path(heard, frequency), frequency)
+    steady = _along(heard, np.array([0.5 * (heard.samples.shape[0] - 1)]), np.array([frequency]), frequency)
+    return followed if followed.explained > max(_CLEARLY * steady.explained, _TELLS) else steady
 
 
 def _shares(power: FloatArray, times: int) -> float:

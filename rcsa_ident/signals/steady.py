@@ -15,7 +15,7 @@ from rcsa_ident.errors import Unsteady
 from rcsa_ident.signals.loud_part import loud_part
 from rcsa_ident.signals.motion import MotionChannels, motion_channels
 from rcsa_ident.signals.recording import Recording
-from rcsa_ident.signals.rotation import Rotation, follow
+from rcsa_ident.signals.rotation import Rotation, follow_changes
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
 from rcsa_ident.signals.speed_search import rotation_near
 from rcsa_ident.signals.steady_part import steady_part, steady_window
@@ -210,8 +210,8 @@ def record_of_lines(
 
 def _turning(displacement: FloatArray, rate: float, speed: float) -> tuple[float, FloatArray | None]:
     """The spindle's mean speed, followed where it changes, and what its angle deviates from that."""
-    rotation = follow(displacement, rate, np.zeros(1), np.array([to_hz(speed)]))
-    return rotation.about(speed) if rotation.uneven else (speed, None)
+    rotation = follow_changes(displacement, rate, to_hz(speed))
+    return (speed, None) if rotation is None else rotation.about(speed)
 
 
 def _no_steady_part(found: str) -> Unsteady:

@@ -15,8 +15,9 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.remarks import Remark
-from rcsa_ident.signals._kernels import angle_signal, angle_sums
+from rcsa_ident.signals._kernels import angle_signal, angle_sums, turned
 from rcsa_ident.signals.alignment import angle_to_air, rising
+from rcsa_ident.signals.line_gain import LineGains
 from rcsa_ident.signals.measurement import (
     MAX_FREQUENCY,
     NO_AIR,
@@ -279,7 +280,7 @@ def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, f
     samples, rate = np.asarray(recording.samples)[:, columns], recording.rate
     low, high = to_hz(min(speeds)), to_hz(max(speeds))
     pace = _pace(low, high, samples.shape[0] / rate)
-    middles, path = speed_path(samples - samples.mean(axis=0), rate, (1.0 - _BEYOND) * low, (1.0 + _BEYOND) * high, pace)
+    middles, path = speed_path(LineGains(samples - samples.mean(axis=0), rate), (1.0 - _BEYOND) * low, (1.0 + _BEYOND) * high, pace)
     rotation = follow(samples, rate, middles, path, teeth)
     by_teeth = bool(np.median(rotation.information) < 1.0 / _ROUND**2)
     if by_teeth:
@@ -342,12 +343,12 @@ def _changing(lines: LineSpectrum, angle: FloatArray) -> FloatArray:
     """By how much lines' amplitudes differ within a window from their means, up to second order in time: the signal of that."""
     n, highest = angle.size, lines.amplitude.shape[0] - 1
     time = 2.0 * (np.arange(n) + 0.5) / n - 1.0
-    found, start = np.zeros_like(lines.rest), np.zeros(1, dtype=int)
+    found, start, turn = np.zeros_like(lines.rest), np.zeros(1, dtype=int), turned(angle)
     for polynomial in (time, 1.5 * time**2 - 0.5):
-        amplitude = angle_sums(lines.rest, angle, start, 2.0 * polynomial / np.sum(polynomial**2), highest)
+        amplitude = angle_sums(lines.rest, turn, start, 2.0 * polynomial / np.sum(polynomial**2), highest)
         # the mean itself is the drift's
         amplitude[:, 0] = 0.0
-        found += polynomial[:, None] * angle_signal(amplitude, angle, n)
+        found += polynomial[:, None] * angle_signal(amplitude, turn, n)
     return found
 
 

@@ -10,7 +10,7 @@ import scipy.optimize
 #: Ratio of the depths at which the growth is looked at before a change of sign is refined, and far from one.
 RATIO, _LONG = 1.2, 1.6
 #: The same where islands may stand.
-_CAREFUL = 1.05
+CAREFUL = 1.05
 #: A peak of the growth below zero that comes so near to it, as a share of the growth without a cut, is looked at closely.
 _NEAR = 0.4
 
@@ -58,7 +58,7 @@ def first_loss(
         # far below zero, as deep as a tool that does not cut, the ladder's steps are long
         calm = min(max(2.0 * values[-1] / at_low - 1.0, 0.0), 1.0)
         step = ratio + (_LONG - ratio) * calm
-        depths.append(min(max(min(depths[-1] * step, careful_from), depths[-1] * _CAREFUL), high))
+        depths.append(min(max(min(depths[-1] * step, careful_from), depths[-1] * CAREFUL), high))
         values.append(known(depths[-1]))
         if values[-1] >= 0.0:
             return _root(known, depths[-2], depths[-1], tolerance)

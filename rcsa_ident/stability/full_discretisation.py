@@ -11,7 +11,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.methods import MethodName, Watch
 from rcsa_ident.stability.monodromy import MonodromyOperator
-from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
+from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes, visits
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, require_modes
 
@@ -41,7 +41,7 @@ class FullDiscretisation:
 
     name: ClassVar[str] = MethodName.FULL_DISCRETISATION.value
     needs: ClassVar[Literal["receptance", "modes"]] = "modes"
-    seconds_per_speed: ClassVar[float] = 0.06
+    seconds_per_operation: ClassVar[float] = 3e-8
     gives_maps: ClassVar[bool] = True
 
     intervals: int | None = None
@@ -57,6 +57,10 @@ class FullDiscretisation:
     def monodromy(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
         """Return the cut's monodromy operator."""
         return MonodromyOperator(require_modes(tip, self.name), process, self.degree)
+
+    def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
+        """Return how often a mode is moved on to the next point of the cut, at each speed."""
+        return visits(process, speeds, top, max_depth, self.degree, frozen=False)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

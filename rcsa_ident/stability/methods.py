@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from rcsa_ident.stability.tip_modes import TipModes
 
 
+#: What the work of a limit is estimated from, as counted on identified machines: looks at a depth until it is found, modes of a fitted tip,
+#: and the highest of them that counts, over the end of the receptance.
+LOOKS, FITTED_MODES, ABOVE_TOP = 13.0, 18.0, 1.6
+
+
 class MethodName(StrEnum):
     """Names of all methods: ``full-discretisation`` is the class `FullDiscretisation` in `full_discretisation`."""
 
@@ -34,13 +39,17 @@ class StabilityMethod(Protocol):
     name: ClassVar[str]
     #: What it works on; a receptance can be computed from modes, modes have to be fitted to a receptance.
     needs: ClassVar[Literal["receptance", "modes"]]
-    #: For one speed at 4000 rev/min, on one core of a plain server; lobes come closer as a spindle turns slower.
-    seconds_per_speed: ClassVar[float]
+    #: Of one of its smallest steps, on one core of a plain server: see `operations`.
+    seconds_per_operation: ClassVar[float]
     #: Whether it also says how fast a vibration grows at any depth, so that `stability_map` takes it.
     gives_maps: ClassVar[bool]
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed; the arguments have been checked."""
+        ...
+
+    def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
+        """Return about how many of its smallest steps each limit takes, shape (n,), where receptances are known up to `top` [rad/s]."""
         ...
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability.first_instability import first_loss
-from rcsa_ident.stability.methods import Watch, coarse_to_fine
-from rcsa_ident.stability.monodromy import RESIDUAL, MonodromyOperator, Multiplier, stable_depth_bound
+from rcsa_ident.stability.first_instability import CAREFUL, first_loss
+from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES, LOOKS, Watch, coarse_to_fine
+from rcsa_ident.stability.monodromy import RESIDUAL, MonodromyOperator, Multiplier, common_period, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
 
 #: Share of the strongest mode's peak below which a mode does not decide on the length of a step.
@@ -21,6 +22,8 @@ _NODES, _LOW_DEGREE, _STEPS = 9.0, 4.0, 24.0
 ISLANDS = 0.03
 #: Residual of the multiplier for a first look.
 ROUGH = 1e-4
+#: Krylov vectors of a look at a depth, as counted on identified machines; share of the period that helix and entry add to the cut.
+_VECTORS, _ENTRY = 30.0, 0.2
 #: How much finer the step is by which the error is told, and how often the search is repeated with it.
 _FINER, _REPEATS = 1.6, 5
 
@@ -57,13 +60,39 @@ def longest_step(cut: MonodromyOperator) -> float:
     return wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
 
 
-def islands_from(cut: MonodromyOperator) -> float:
+def visits(process: MillingProcess, speeds: FloatArray, top: float, max_depth: float, degree: int, frozen: bool) -> FloatArray:
+    """Return about how often a mode is moved on to the next point until the limits of a fitted tip are known, shape (n,).
+
+    Parameters
+    ----------
+    process : MillingProcess
+    speeds : array, shape (n,) [rad/s]
+    top : float [rad/s]
+        Where the tip's receptance ends.
+    max_depth : float [m]
+    degree, frozen
+        As of `MonodromyOperator`.
+    """
+    cutter, engagement = process.cutter, process.engagement
+    uneven = bool(np.ptp(cutter.pitch) > 1e-9 or np.ptp(cutter.runout) > 0.0)
+    period = common_period(process, 2.0 * np.pi if uneven else float(cutter.pitch[0]))
+    # every tooth that differs enters and leaves at points of its own
+    windows = cutter.teeth if uneven else 1
+    cutting = min(cutter.teeth * (engagement.exit - engagement.entry) / (2.0 * np.pi) + _ENTRY, 1.0)
+    waves = period / speeds * ABOVE_TOP * top / (2.0 * np.pi)
+    each = degree * _STEPS if frozen else _NODES * (1.0 + _LOW_DEGREE / degree**2)
+    points = np.maximum(cutting * waves * each, 2.0 * degree * windows)
+    islands = islands_from(process)
+    looks = LOOKS + (np.log(max_depth / islands) / np.log(CAREFUL) if islands < max_depth else 0.0)
+    return looks * _VECTORS * points * (FITTED_MODES + windows - 1)
+
+
+def islands_from(process: MillingProcess) -> float:
     """The depth beyond which islands of instability may stand under the first limit.
 
     Where a helix spreads an interrupted cut over the angle, period doubling ends above as well as below, at depths that are shares
     of the axial pitch.
     """
-    process = cut.process
     in_cut = process.cutter.teeth * (process.engagement.exit - process.engagement.entry) / (2.0 * np.pi)
     if process.cutter.helix < 1e-6 or in_cut >= 1.0:
         return np.inf
@@ -112,10 +141,10 @@ def _limit(
     tooth = 2.0 * np.pi / (cut.process.cutter.teeth * speed)
     if intervals is not None:
         step = tooth / intervals
-        return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance, careful_from=islands_from(cut)), step, True
+        return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance, careful_from=islands_from(cut.process)), step, True
     # a search that is a little too deep and a little rough, then the limit from where it ended
     step = longest_step(cut)
-    depth = first_loss(Growth(cut, speed, step, ROUGH), low, 1.1 * max_depth, 10.0 * tolerance, careful_from=islands_from(cut))
+    depth = first_loss(Growth(cut, speed, step, ROUGH), low, 1.1 * max_depth, 10.0 * tolerance, careful_from=islands_from(cut.process))
     if depth is None:
         return None, step, True
     for _ in range(_REPEATS):
@@ -123,7 +152,7 @@ def _limit(
         found = _polished(growth, depth, tolerance)
         if found is None:
             # not there with the finer step: looked for again
-            depth = first_loss(growth, low, 1.1 * max_depth, tolerance, careful_from=islands_from(cut))
+            depth = first_loss(growth, low, 1.1 * max_depth, tolerance, careful_from=islands_from(cut.process))
             if depth is None:
                 return None, step, True
             found = depth, (growth(1.01 * depth) - growth(0.99 * depth)) / (0.02 * depth)

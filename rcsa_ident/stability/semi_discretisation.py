@@ -10,7 +10,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.stability.methods import MethodName, Watch
 from rcsa_ident.stability.monodromy import MonodromyOperator
-from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
+from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes, visits
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, require_modes
 
@@ -40,7 +40,7 @@ class SemiDiscretisation:
 
     name: ClassVar[str] = MethodName.SEMI_DISCRETISATION.value
     needs: ClassVar[Literal["receptance", "modes"]] = "modes"
-    seconds_per_speed: ClassVar[float] = 0.4
+    seconds_per_operation: ClassVar[float] = 3e-8
     gives_maps: ClassVar[bool] = True
 
     intervals: int | None = None
@@ -53,6 +53,10 @@ class SemiDiscretisation:
     def monodromy(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
         """Return the cut's monodromy operator."""
         return MonodromyOperator(require_modes(tip, self.name), process, _DEGREE, frozen=True)
+
+    def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
+        """Return how often a mode is moved on to the next point of the cut, at each speed."""
+        return visits(process, speeds, top, max_depth, _DEGREE, frozen=True)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import to_rpm
 
 
 class Verdict(StrEnum):
@@ -29,6 +30,8 @@ class TestedCuts:
     spindle_speed : array, shape (n,) [rad/s]
     axial_depth : array, shape (n,) [m]
     verdict : tuple of Verdict, length n
+    chatter_frequency : array, shape (n,) [rad/s], default all NaN
+        Where it was measured; NaN elsewhere.
     """
 
     __test__ = False  # a noun, though pytest looks for such names
@@ -36,19 +39,68 @@ class TestedCuts:
     spindle_speed: FloatArray
     axial_depth: FloatArray
     verdict: tuple[Verdict, ...]
+    chatter_frequency: FloatArray = None  # type: ignore[assignment]  # all NaN, one for each cut
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "spindle_speed", frozen(self.spindle_speed))
         object.__setattr__(self, "axial_depth", frozen(self.axial_depth))
         shape = (len(self.verdict),)
+        chatter = np.full(shape, np.nan) if self.chatter_frequency is None else self.chatter_frequency
+        object.__setattr__(self, "chatter_frequency", frozen(chatter))
+        if self.chatter_frequency.shape != shape or not np.all(np.isnan(self.chatter_frequency) | (self.chatter_frequency > 0.0)):
+            raise InputError(
+                "chatter_frequency", self.chatter_frequency.shape, f"{shape[0]} numbers above 0, or NaN where none was measured"
+            )
         for name in ("spindle_speed", "axial_depth"):
             values = getattr(self, name)
             if values.shape != shape or not np.all(np.isfinite(values) & (values > 0.0)):
                 raise InputError(name, values.shape, f"{shape[0]} finite numbers above 0")
 
+    @classmethod
+    def none(cls) -> TestedCuts:
+        """Return a table without cuts."""
+        return cls(np.zeros(0), np.zeros(0), ())
+
     def seen(self, verdict: Verdict) -> NDArray[np.bool_]:
         """True where the cut was seen so, shape (n,)."""
         return np.array([each is verdict for each in self.verdict], dtype=bool)
+
+    def at_places(self, places: NDArray[np.intp]) -> TestedCuts:
+        """Return some of the cuts."""
+        arrays = (self.spindle_speed[places], self.axial_depth[places])
+        return TestedCuts(*arrays, tuple(self.verdict[k] for k in places), self.chatter_frequency[places])
+
+    def joined(self, other: TestedCuts) -> TestedCuts:
+        """Return these cuts, and behind them those of another table that are not the same ones."""
+        known = set(self._rows)
+        new = other.at_places(np.array([k for k, row in enumerate(other._rows) if row not in known], dtype=np.intp))
+        names = ("spindle_speed", "axial_depth", "chatter_frequency")
+        speed, depth, chatter = (np.concatenate([getattr(part, name) for part in (self, new)]) for name in names)
+        return TestedCuts(speed, depth, self.verdict + new.verdict, chatter)
+
+    @property
+    def _rows(self) -> list[tuple[float, float, Verdict]]:
+        """Speed and depth to nine digits, and verdict: what makes two rows the same cut."""
+        numbers = zip(self.spindle_speed.tolist(), self.axial_depth.tolist(), self.verdict, strict=True)
+        return [(float(f"{speed:.9g}"), float(f"{depth:.9g}"), verdict) for speed, depth, verdict in numbers]
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """A sentence for each speed at which a cut was stable that is as deep as one that chattered, or deeper.
+
+        Islands of instability aside, a stability limit has one side only: one of the two verdicts is wrong, or the machine changed.
+        """
+        stable, chatter = self.seen(Verdict.STABLE), self.seen(Verdict.CHATTER)
+        found = []
+        for speed in np.unique(self.spindle_speed[stable & np.isin(self.spindle_speed, self.spindle_speed[chatter])]):
+            here = self.spindle_speed == speed
+            deepest, least = self.axial_depth[here & stable].max(), self.axial_depth[here & chatter].min()
+            if deepest >= least:
+                found.append(
+                    f"at {to_rpm(float(speed)):.6g} rev/min a cut of {1e3 * deepest:.4g} mm was stable and one of {1e3 * least:.4g} mm "
+                    "chattered: the labels contradict each other"
+                )
+        return tuple(found)
 
 
 @dataclass(frozen=True, slots=True)

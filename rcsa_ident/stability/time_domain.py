@@ -14,7 +14,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability import _time_kernels as kernels
 from rcsa_ident.stability.first_instability import first_loss
-from rcsa_ident.stability.methods import MethodName, Watch, coarse_to_fine
+from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES, LOOKS, MethodName, Watch, coarse_to_fine
 from rcsa_ident.stability.monodromy import common_period, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import ModeArrays, TipModes, require_modes
@@ -31,6 +31,8 @@ _FEED, _PUSH, _CHATTER = 1e-4, 1e-6, 0.02
 _FASTER = 0.25
 #: States that the search for a steady state looks back to, and how many periods it may take.
 _MEMORY, _MOST = 25, 120
+#: Of these, as many as it takes where teeth differ.
+_SETTLING = 22.0
 #: A disturbance that has fallen to this share of the push is gone.
 _GONE = 1e-5
 #: Steps of the ladder of depths.
@@ -86,7 +88,7 @@ class TimeDomain:
 
     name: ClassVar[str] = MethodName.TIME_DOMAIN.value
     needs: ClassVar[Literal["receptance", "modes"]] = "modes"
-    seconds_per_speed: ClassVar[float] = 4.5
+    seconds_per_operation: ClassVar[float] = 6e-8
     gives_maps: ClassVar[bool] = False
 
     periods: int = 150
@@ -99,6 +101,16 @@ class TimeDomain:
             raise InputError("periods", self.periods, "a whole number from 20 to 100000")
         if not 1e-6 <= self.tolerance <= 0.1:
             raise InputError("tolerance", self.tolerance, "a share from 1e-6 to 0.1")
+
+    def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
+        """Return how often a mode or a tooth's slice is moved on by a step, at each speed."""
+        cutter = process.cutter
+        steps = np.maximum(_FEWEST, _STEPS * ABOVE_TOP * top / (cutter.teeth * speeds))
+        # limits are some part of the depths that are allowed
+        slices = 1.0 + 0.25 * _SLICES * 2.0 * max_depth * np.tan(cutter.helix) / cutter.diameter
+        uneven = np.ptp(cutter.pitch) > 1e-9 or np.ptp(cutter.runout) > 0.0
+        periods = 2.0 * self.periods + (_SETTLING * cutter.teeth if uneven else 0.0)
+        return LOOKS * periods * steps * (FITTED_MODES + cutter.teeth * slices)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

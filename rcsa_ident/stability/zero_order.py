@@ -17,9 +17,12 @@ from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, receptance_of
+from rcsa_ident.units import to_rpm
 
 #: Teeth in the cut, on average, below which the mean directional matrix no longer tells the whole story.
 FEWEST_TEETH_IN_CUT = 1.0
+#: Unequal pitch asks each speed at all frequencies: so many times as much.
+_PITCH_FACTOR = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +38,12 @@ class ZeroOrder:
 
     name: ClassVar[str] = MethodName.ZERO_ORDER.value
     needs: ClassVar[Literal["receptance", "modes"]] = "receptance"
-    seconds_per_speed: ClassVar[float] = 2e-5
+    seconds_per_operation: ClassVar[float] = 2e-5
     gives_maps: ClassVar[bool] = False
+
+    def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
+        """Return how many lobes stand above each speed, over those at 4000 rev/min; with unequal pitch all frequencies are asked."""
+        return (1.0 if _equal_pitch(process) else _PITCH_FACTOR) * 4000.0 / to_rpm(speeds)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the lower envelope of all lobes in the range of `speeds`."""

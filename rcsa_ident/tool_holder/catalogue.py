@@ -74,7 +74,7 @@ class CatalogueHolder(Shown):
     @property
     def mass(self) -> float:
         """Mass of the segments [kg]: with collet and nut, without the taper and the tool."""
-        return sum(_mass(s) for s in self.segments)
+        return sum(s.mass for s in self.segments)
 
     def __str__(self) -> str:
         return f"{self.taper} {self.chuck}, bore {1e3 * self.segments[0].inner_diameter:g} mm, {1e3 * self.length:g} mm, {self.mass:.2f} kg"
@@ -190,9 +190,3 @@ def _bored(outer: list[BeamSegment], clamped: float, bore: float, rear: float) -
             found.append(replace(segment.part(inside, segment.length), inner_diameter=rear))
         start += segment.length
     return found
-
-
-def _mass(segment: BeamSegment) -> float:
-    """Of a hollow cone [kg]."""
-    a, b = segment.diameter, segment.end
-    return segment.material.density * math.pi / 4.0 * segment.length * ((a * a + a * b + b * b) / 3.0 - segment.inner_diameter**2)

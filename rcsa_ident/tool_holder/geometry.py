@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import pi
 
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.shown import Shown
@@ -97,6 +98,13 @@ class BeamSegment:
     def end(self) -> float:
         """Outer diameter at the flange's end [m]."""
         return self.diameter if self.end_diameter is None else self.end_diameter
+
+    @property
+    def mass(self) -> float:
+        """Mass, of a cone as its sections are [kg]."""
+        a, b = self.diameter, self.end
+        area = pi / 4.0 * ((a * a + a * b + b * b) / 3.0 - self.inner_diameter**2) if self.area is None else self.area
+        return self.material.density * area * self.length
 
     def part(self, start: float, end: float) -> BeamSegment:
         """Return the piece between two distances from the segment's tip end [m]."""
@@ -211,14 +219,30 @@ def clamped(
         raise InputError(
             "stickout + insertion", f"{wanted * 1e3:g} mm", f"at most the tool's length, {length * 1e3:g} mm (the sum of its segments)"
         )
-    used: list[BeamSegment] = []
-    left = wanted
+    used, _ = _cut(tool, wanted)
+    return ToolAssembly(used, holder, insertion, contact)
+
+
+def behind(tool: tuple[BeamSegment, ...], assembly: ToolAssembly) -> tuple[BeamSegment, ...]:
+    """Return what a tool at its full length has behind that which an assembly of it uses."""
+    return _cut(tool, assembly.tool_length)[1]
+
+
+def _cut(tool: tuple[BeamSegment, ...], length: float) -> tuple[tuple[BeamSegment, ...], tuple[BeamSegment, ...]]:
+    """A tool in front of a place and behind it."""
+    front: list[BeamSegment] = []
+    rear: list[BeamSegment] = []
+    left = length
     for segment in tool:
         if left <= 1e-9:
-            break
-        used.append(segment if segment.length <= left + 1e-9 else segment.part(0.0, left))
+            rear.append(segment)
+        elif segment.length <= left + 1e-9:
+            front.append(segment)
+        else:
+            front.append(segment.part(0.0, left))
+            rear.append(segment.part(left, segment.length))
         left -= segment.length
-    return ToolAssembly(tuple(used), holder, insertion, contact)
+    return tuple(front), tuple(rear)
 
 
 def stiffened(assembly: ToolAssembly, share: float) -> ToolAssembly:

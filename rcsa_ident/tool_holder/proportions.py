@@ -69,10 +69,15 @@ def _flutes(assembly: ToolAssembly, cutter: Cutter) -> float:
     return length
 
 
-def _values(assembly: ToolAssembly, cutter: Cutter) -> Iterator[tuple[str, Range, float]]:
+def cutter_values(cutter: Cutter) -> Iterator[tuple[str, Range, float]]:
+    """Yield what is asked of a cutter by itself: its key, the range, the value."""
     yield "cutter.teeth", TEETH, cutter.teeth
     yield "cutter.diameter_mm", DIAMETER, cutter.diameter
     yield "cutter.helix_deg", HELIX, cutter.helix
+
+
+def _values(assembly: ToolAssembly, cutter: Cutter) -> Iterator[tuple[str, Range, float]]:
+    yield from cutter_values(cutter)
     yield "tool.stickout_mm", STICKOUT, assembly.stickout
     for body, segments in (("tool", assembly.tool), ("holder", assembly.holder)):
         for i, segment in enumerate(segments):

@@ -7,7 +7,7 @@ stickouts (proper orthogonal decomposition); after that a question costs one sma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import log
@@ -16,6 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.tool_holder._kernels import reduced_receptances
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered
 from rcsa_ident.tool_holder.geometry import ToolAssembly
@@ -28,10 +29,14 @@ _SHARES = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95, 1.1)
 #: Alterations at which they are taken: about twice what an honest drawing leaves open.
 _FAR = {"fluted_diameter": 0.08, "youngs_modulus": 0.05, "stickout": 3e-4, "fluted_length": 3e-4, "holder_diameter": 0.01}
 _CONTACTS = ((1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0))
-#: Largest alterations between which the matrices' polynomials are laid, and their degrees.
-_REACH = {"fluted_diameter": (0.12, 4), "stickout": (6e-4, 2), "fluted_length": (6e-4, 2), "holder_diameter": (0.02, 2)}
+#: What the matrices are polynomials of: the largest alteration between which each is laid, and its degree. `shank` is the change of the
+#: shank's length in front of the holder, stickout less fluted length: a stretch's matrices know its own length alone.
+_REACH = {"fluted_diameter": (0.12, 4), "fluted_length": (6e-4, 4), "shank": (6e-4, 4), "holder_diameter": (0.02, 2)}
+#: Both belong to the fluted stretch, whose matrices hold their products, too, up to each one's square; laid through these alterations.
+_PRODUCT = {"fluted_diameter": 0.08, "fluted_length": 3e-4}
+_POWERS = ((1, 1), (1, 2), (2, 1), (2, 2))
 #: Terms that the tool's modulus multiplies: those of the tool.
-_OF_TOOL = ("fluted_diameter", "stickout", "fluted_length")
+_OF_TOOL = ("fluted_diameter", "fluted_length", "shank")
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 
 
@@ -99,7 +104,7 @@ def rough_tool_holder(assembly: ToolAssembly, highest: float) -> RoughToolHolder
     """
 
     @cache
-    def structure(by: Alteration):
+    def structure(by: Alteration) -> Structure:
         return free_body(altered(assembly, by), highest, like=assembly).structure
 
     drawn = structure(Alteration())
@@ -119,12 +124,12 @@ def rough_tool_holder(assembly: ToolAssembly, highest: float) -> RoughToolHolder
         found: FloatArray = reduced(replace(by, youngs_modulus=twice)) - reduced(by)
         return found
 
-    base = reduced(Alteration())
-    terms = [base, of_tool(Alteration())]
-    for name, (reach, degree) in _REACH.items():
-        terms += _polynomial(reduced, base, name, reach, degree)
-    for name in _OF_TOOL:
-        terms += _polynomial(of_tool, terms[1], name, *_REACH[name])
+    base, tool = reduced(Alteration()), of_tool(Alteration())
+    terms = [base, tool]
+    for of, start, names in ((reduced, base, tuple(_REACH)), (of_tool, tool, _OF_TOOL)):
+        for name in names:
+            terms += _polynomial(of, start, name)
+        terms += _products(of, start)
     terms += [reduced(Alteration(**{name: twice})) - base for name in _CONTACT]
     return RoughToolHolder(frozen(np.array(terms)), frozen(loads @ basis))
 
@@ -137,7 +142,7 @@ def _around(assembly: ToolAssembly) -> list[Alteration]:
     return found
 
 
-def _basis(structures: Sequence, loads: FloatArray, highest: float) -> FloatArray:
+def _basis(structures: Sequence[Structure], loads: FloatArray, highest: float) -> FloatArray:
     """Vectors that hold the responses of all structures best, orthonormal over the first one's mass, shape (d, r)."""
     responses = []
     for s in structures:
@@ -155,26 +160,53 @@ def _basis(structures: Sequence, loads: FloatArray, highest: float) -> FloatArra
     return found
 
 
-def _polynomial(matrices, base: FloatArray, name: str, reach: float, degree: int) -> list[FloatArray]:
-    """Coefficients of the matrices' change with one alteration, first power to last."""
+def _at(**values: float) -> Alteration:
+    """The alteration with these values of what the matrices are polynomials of."""
+    shank = values.pop("shank", 0.0)
+    return Alteration(stickout=shank + values.get("fluted_length", 0.0), **values)
+
+
+def _polynomial(matrices: Callable[[Alteration], FloatArray], base: FloatArray, name: str) -> list[FloatArray]:
+    """Coefficients of the matrices' change with one variable, first power to last."""
+    reach, degree = _REACH[name]
     places = reach * np.arange(-degree // 2, degree // 2 + 1) / (degree // 2)
     places = places[places != 0.0]
-    changes = np.array([matrices(Alteration(**{name: float(place)})) - base for place in places])
+    changes = np.array([matrices(_at(**{name: float(place)})) - base for place in places])
     powers = places[:, None] ** np.arange(1, degree + 1)
     return list(np.tensordot(np.linalg.inv(powers), changes, axes=1))
 
 
+def _products(matrices: Callable[[Alteration], FloatArray], base: FloatArray) -> list[FloatArray]:
+    """Coefficients of x y, x y^2, x^2 y and x^2 y^2 in the matrices' change with two variables at once."""
+    (one, x), (other, y) = _PRODUCT.items()
+    places = [(a, b) for a in (-x, x) for b in (-y, y)]
+    changes = [matrices(_at(**{one: a, other: b})) - matrices(_at(**{one: a})) - matrices(_at(**{other: b})) + base for a, b in places]
+    powers = np.array([[a**i * b**j for i, j in _POWERS] for a, b in places])
+    return list(np.tensordot(np.linalg.inv(powers), np.array(changes), axes=1))
+
+
 def _shares_of(by: Alteration) -> tuple[FloatArray, FloatArray]:
     """How much of each term an alteration asks for, shape (t,), and how that changes with each of its fields, shape (t, 9)."""
-    stiffer = np.expm1(by.youngs_modulus)
+    values = {name: by.stickout - by.fluted_length if name == "shank" else getattr(by, name) for name in _REACH}
+    stiffer = float(np.expm1(by.youngs_modulus))
     shares, slopes = [1.0, stiffer], [{}, {"youngs_modulus": stiffer + 1.0}]
     for names, factor, modulus in ((tuple(_REACH), 1.0, 0.0), (_OF_TOOL, stiffer, stiffer + 1.0)):
         for name in names:
-            value = getattr(by, name)
-            for power in range(1, _REACH[name][1] + 1):
-                shares.append(factor * value**power)
-                slopes.append({name: factor * power * value ** (power - 1), "youngs_modulus": modulus * value**power})
+            x = values[name]
+            for i in range(1, _REACH[name][1] + 1):
+                shares.append(factor * x**i)
+                slopes.append({name: factor * i * x ** (i - 1), "youngs_modulus": modulus * x**i})
+        (one, other), (x, y) = _PRODUCT, (values[name] for name in _PRODUCT)
+        for i, j in _POWERS:
+            shares.append(factor * x**i * y**j)
+            along = {one: i * x ** (i - 1) * y**j, other: j * x**i * y ** (j - 1)}
+            slopes.append({name: factor * slope for name, slope in along.items()} | {"youngs_modulus": modulus * x**i * y**j})
     for name in _CONTACT:
-        shares.append(np.expm1(getattr(by, name)))
-        slopes.append({name: np.exp(getattr(by, name))})
-    return np.array(shares), np.array([[each.get(name, 0.0) for name in ALTERATIONS] for each in slopes])
+        shares.append(float(np.expm1(getattr(by, name))))
+        slopes.append({name: float(np.exp(getattr(by, name)))})
+    rows = []
+    for slope in slopes:
+        shank = slope.pop("shank", 0.0)
+        slope["stickout"], slope["fluted_length"] = shank, slope.get("fluted_length", 0.0) - shank
+        rows.append([slope.get(name, 0.0) for name in ALTERATIONS])
+    return np.array(shares), np.array(rows)

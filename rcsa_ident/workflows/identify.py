@@ -19,12 +19,12 @@ from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines, no
 from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
-from rcsa_ident.identification.result import Identification
+from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
-from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.sweep import measure_pass
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.drawings import rough_toolings
@@ -38,6 +38,9 @@ from rcsa_ident.units import from_hz
 _STEP = 1e-5
 #: Cuts from which on speeds beside the programmed ones say something, and by what share they lie beside them at least.
 _FEW_SPEEDS, _LEAST_CLOCK_ERROR = 5, 2e-4
+DRAWINGS_EXACT = (
+    "toolings were taken as drawn, whatever their [spread] says: beside hammer tests and by the published method nothing of them is learned"
+)
 #: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
 #: Reads a hammer test's frequencies [Hz] and receptance [m/N].
@@ -210,7 +213,8 @@ def clock_remark(readings: Sequence[Reading]) -> Remark | None:
 
 def of_campaign(found: Identification, campaign: Campaign) -> Identification:
     """Return the identification with what its machine has to know of the campaign, what is unusual about that, and shapes of cutters."""
-    notes = tuple(dict.fromkeys((*found.notes, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
+    exact = () if found.toolings is not None or not campaign.rough else (Remark(IdentificationCode.DRAWINGS_EXACT, DRAWINGS_EXACT),)
+    notes = tuple(dict.fromkeys((*found.notes, *exact, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
     drawings = {name: tooling.drawing for name, tooling in campaign.toolings.items()}
     told = () if found.toolings is None else learned(found.toolings, drawings)
     return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=told)
@@ -260,7 +264,7 @@ def _mode_deviation(
 def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = ()) -> IdentificationData:
     """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them."""
     if not tests:
-        return _data_of_cuts(campaign, readings)
+        return with_rough(_data_of_cuts(campaign, readings), campaign)
     at_points = {name: partial(receptance_at_points, t.assembly) for name, t in campaign.toolings.items()}
     usable = any(bool(each.measurements) for each in readings)
     return with_tests(_data_of_cuts(campaign, readings) if usable else None, tests, at_points)
@@ -277,7 +281,7 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
     turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
     data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning)
-    return with_rough(data, campaign)
+    return replace(data, softening_spread=campaign.softening_spread)
 
 
 def with_rough(data: IdentificationData, campaign: Campaign) -> IdentificationData:
@@ -286,9 +290,15 @@ def with_rough(data: IdentificationData, campaign: Campaign) -> IdentificationDa
     rough = rough_toolings({t.name: t.drawing for t in drawn})
     if rough is None:
         return data
-    depths = [[cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name] for name in data.toolings]
-    depth = np.array([0.02e-3 / np.mean(each) for each in depths])
-    data = data.with_scales(depth, np.full(len(data.axes), 0.02)).with_cross_talk(0.015)
+    depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]
+    shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
+    sensors = [shown.get(axis.axis) for axis in data.axes]
+    # a place on the housing moves as it likes: its motion has no scale to be wrong
+    gain, talk, delay = (
+        np.array([0.0 if sensor is None else getattr(sensor, name) for sensor in sensors])
+        for name in ("gain_spread", "cross_talk_spread", "delay_spread")
+    )
+    data = data.with_scales(campaign.depth_spread / np.array(depths), gain, delay).with_cross_talk(talk)
     highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
     return data.with_rough_toolings(rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
 

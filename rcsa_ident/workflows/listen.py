@@ -52,7 +52,8 @@ def listen_to(
     >>> print(answer, answer.teeth)
     stable at 6000.0 rev/min 4
     """
-    whole = np.stack([np.asarray(channel, dtype=float) for channel in channels], axis=1)
+    # channel after channel in memory: most of what follows goes along one of them
+    whole = np.stack([np.asarray(channel, dtype=float) for channel in channels]).T
     spare = max(whole.shape[0] - MOST, 0) // 2
     samples = whole[spare : spare + MOST]
     sensors = tuple(Sensor(f"channel {i + 1}", Quantity.SOUND) for i in range(samples.shape[1]))

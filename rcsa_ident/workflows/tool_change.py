@@ -19,14 +19,16 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import tips_over_speed
-from rcsa_ident.machining_setup import CutSpec, Tooling
+from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.label_noise import LabelNoise
 from rcsa_ident.stability.lobes import DEEPER, DRAWS, both_directions, in_proportion, stability_lobes
-from rcsa_ident.stability.methods import MethodName, StabilityMethod, Watch, Watched
+from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
@@ -45,11 +47,8 @@ BEYOND = 1.5
 ABOVE, _ABOVE_STEP, CRITICAL, _ABOVE_EVERY = 2.5, from_hz(10.0), 0.7, 4
 #: Seconds for a line and an unknown of the posterior, those of planes that feel each other, and further seconds for a speed with bands.
 _SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
-#: Unequal pitch costs the zero-order method so many times as much; a machine that changes with speed so many further seconds.
-_PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
-#: Where teeth differ, methods that follow a period follow a revolution: so many teeth cost once more. A simulation asks every tooth
-#: in every step, which counts from so many on.
-_TEETH_OF_PERIOD, _TEETH_OF_STEP = 2.0, 40.0
+#: A machine that changes with speed costs so many further seconds, and so many the modes of a tip.
+_CHANGING_SECONDS, _FIT_SECONDS = 4.0, 1.0
 #: What recommendations are computed by where the lobes are a preview, and at about how many speeds.
 _FITTING, _FITTED_SPEEDS = FullDiscretisation(), 35
 _UNLIMITED = SpindleDrive.flat(None, None, None)
@@ -150,31 +149,30 @@ class ToolChange:
     @property
     def omega(self) -> FloatArray:
         """Frequencies of the receptances that the limits are computed from, shape (k,) [rad/s]."""
-        return self.machine.lines(BEYOND if self.method.needs == "modes" else 1.0)
+        return self._lines_of(self.method)
+
+    def _lines_of(self, method: StabilityMethod) -> FloatArray:
+        return self.machine.lines(BEYOND if method.needs == "modes" else 1.0)
 
     @property
     def seconds(self) -> float:
         """About how long an advice takes on one core of a plain server [s], with the speeds beside those that are asked for."""
         zero_order = isinstance(self.method, ZeroOrder)
-        each = self.method.seconds_per_speed + (_BAND_SECONDS if self.draws else 0.0)
-        # lobes come closer as a spindle turns slower
-        found = each * self._teeth_factor(self.method.name) * float(np.sum(4000.0 / to_rpm(pad_speeds(self.speeds, TOLERANCE))))
+        speeds = pad_speeds(self.speeds, TOLERANCE)
+        found = float(np.sum(self._seconds_of(self.method, speeds)))
+        # of drawn machines, whose lobes come closer as a spindle turns slower
+        found += _BAND_SECONDS * float(np.sum(4000.0 / to_rpm(speeds))) if self.draws else 0.0
+        found += _FIT_SECONDS if self.method.needs == "modes" else 0.0
         if not (zero_order and self.machine.prepared):
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
         if zero_order and self.recommend:
-            each = _FITTING.seconds_per_speed * self._teeth_factor(_FITTING.name)
-            found += _FITTED_SPEEDS * each * float(np.mean(4000.0 / to_rpm(self.speeds)))
+            found += _FIT_SECONDS + _FITTED_SPEEDS * float(np.mean(self._seconds_of(_FITTING, self.speeds)))
         return found
 
-    def _teeth_factor(self, method: str) -> float:
-        """How many times as long a method takes as with few equal teeth."""
-        cutter = self.process.cutter
-        uneven = np.ptp(cutter.pitch) > 1e-9
-        if method == MethodName.ZERO_ORDER:
-            return _PITCH_FACTOR if uneven else 1.0
-        factor = 1.0 + cutter.teeth / _TEETH_OF_PERIOD if uneven or np.ptp(cutter.runout) > 0.0 else 1.0
-        return factor * max(1.0, (cutter.teeth / _TEETH_OF_STEP) ** 2) if method == MethodName.TIME_DOMAIN else factor
+    def _seconds_of(self, method: StabilityMethod, speeds: FloatArray) -> FloatArray:
+        """About how long a method takes for the limit at each speed [s]."""
+        return method.seconds_per_operation * method.operations(self.process, speeds, float(self._lines_of(method)[-1]), self.max_depth)
 
     def watched(self, watch: Watch) -> ToolChange:
         """Return the same question, whose method tells each speed's limit once it is known, where it asks speed by speed."""
@@ -185,6 +183,8 @@ class ToolChange:
         speeds = np.unique(self.speeds if speeds is None else speeds)
         depth, draws = self.max_depth if max_depth is None else max_depth, self.draws if draws is None else draws
         process, parts, order = self.process, [], []
+        if isinstance(self.machine, LearntTip):
+            return self.machine.limits(process, speeds, depth, draws)
         for places, tip in tips_over_speed(self.machine, self.tooling, self.omega, speeds, draws > 0, self.stiffness_spread):
             order.append(places)
             parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
@@ -218,6 +218,8 @@ class ToolChange:
 
     def _beyond(self, lobes: StabilityLobes) -> list[str]:
         """Sentences where the limits leave out what is there: the end of the tool's edges, a mode above the frequencies."""
+        if isinstance(self.tooling, BareCutter):
+            return []
         longest, where = edge_length(self.tooling.assembly, self.tooling.cutter)
         deeper = int(np.sum(np.minimum(lobes.limit_depth, self.max_depth) > longest * (1.0 + 1e-9)))
         told = f"at {deeper} of {lobes.spindle_speed.size} speeds the limit is deeper than the tool's {where} of {1e3 * longest:.4g} mm"
@@ -265,7 +267,7 @@ def advise(
     found = _recommended(change, lobes, usable, usable_of, tolerance)
     return Advice(
         change.tooling.name,
-        change.tooling.assembly.stickout,
+        None if isinstance(change.tooling, BareCutter) else change.tooling.assembly.stickout,
         lobes,
         usable,
         found.points,
@@ -364,8 +366,27 @@ def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
 def classify_tested_cuts(change: ToolChange, cuts: TestedCuts) -> Tally:
     """Return how many tested cuts lie on the side of the limit where they were seen, each asked at its own speed."""
     deepest = 1.01 * float(cuts.axial_depth.max())
-    lobes = change.limits(cuts.spindle_speed, max(change.max_depth, deepest), draws=0)
+    # a learnt tip's limit is that up to which half of its draws are stable: all of them are asked
+    draws = len(change.machine.posterior.z) if isinstance(change.machine, LearntTip) else 0
+    lobes = change.limits(cuts.spindle_speed, max(change.max_depth, deepest), draws)
     return tally(cuts, lobes.limit_depth[np.searchsorted(lobes.spindle_speed, cuts.spindle_speed)])
+
+
+def probabilities_stable(change: ToolChange, cuts: TestedCuts) -> FloatArray:
+    """Return the probability that each tested cut is called stable, shape (n,).
+
+    A machine that was identified, or modes without spreads, say it by their own limits and what those leave open, beside the doubt that
+    labels always have; a learnt tip by its draws.
+    """
+    if isinstance(change.machine, LearntTip):
+        return change.machine.probabilities(change.process, cuts)
+    deepest = max(change.max_depth, 4.0 * float(cuts.axial_depth.max()))
+    speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
+    lobes = change.limits(speeds, deepest)
+    drawn = lobes.limit_depth[None] if lobes.drawn is None else lobes.drawn
+    margin = np.log(np.minimum(drawn, deepest))[:, place] - np.log(cuts.axial_depth)
+    found: FloatArray = LabelNoise().stable(margin).mean(axis=0)
+    return found
 
 
 def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> StabilityMap:
@@ -412,7 +433,7 @@ def _modes_above(machine: TipSource, tooling: Tooling, omega: FloatArray) -> lis
     What a limit depends on is how negative the real part of the tip's receptance is. A measurement says nothing beyond its end: the
     flange is then held at rest, which leaves the tool-holder's modes about where they are.
     """
-    if not (isinstance(machine, Machine) or machine.ends):
+    if not (isinstance(machine, Machine) or machine.ends) or isinstance(tooling, BareCutter):
         return []
     source, top = machine.at(None), float(omega[-1])
     above = np.arange(top, ABOVE * top, _ABOVE_STEP)

@@ -348,7 +348,7 @@ def test_what_an_identification_reads(uploaded, tmp_path, store):
     client.archive(id, tmp_path / "c.zip")
     zipfile.ZipFile(tmp_path / "c.zip").extractall(tmp_path / "folder")
     folder = read_campaign(tmp_path / "folder")
-    found, read = load_campaign(store, client.http.app.state.components.files, "local", id)
+    found, read, _ = load_campaign(store, client.http.app.state.components.files, "local", id)
     assert [cut.id for cut in found.cuts] == [cut.id for cut in folder.cuts]
     assert (found.name, found.sensors, found.workpiece) == (folder.name, folder.sensors, folder.workpiece)
     assert {name: tooling_keys(tooling) for name, tooling in found.toolings.items()} == {

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -157,26 +158,53 @@ class Preview:
 
 
 def of_a_preview(_preview):
+    time.sleep(0.05)
     return os.getpid()
 
 
 @pytest.mark.slow
-def test_a_preview_waits_behind_no_question_that_takes_long(pool):
+def test_a_preview_waits_behind_no_question_that_takes_long():
     """Else this test never ends."""
+    pool = Pool(1, 10, 1)
+    pool.start()
 
     async def asked():
         usual = await pool.run(of_a_preview, Preview())
-        long = asyncio.ensure_future(pool.run(forever))
-        while pool.lanes[0].calls == 0:
-            await asyncio.sleep(0.0)
-        aside = await pool.run(of_a_preview, Preview())
-        long.cancel()
-        await asyncio.gather(long, return_exceptions=True)
-        return usual, aside
+        # the long ones begin while previews wait before and behind them
+        calls = [of_a_preview, of_a_preview, forever, forever, of_a_preview, of_a_preview]
+        tasks = [asyncio.ensure_future(pool.run(call, *([Preview()] if call is of_a_preview else []))) for call in calls]
+        found = await asyncio.gather(*tasks[:2], *tasks[4:])
+        for each in tasks[2:4]:
+            each.cancel()
+        await asyncio.gather(*tasks[2:4], return_exceptions=True)
+        return usual, found
 
-    usual, aside = asyncio.run(asked())
-    # while a process of the usual ones is free it answers previews, too: its machines are read already
-    assert usual != aside == pool.members[1].process.pid
+    try:
+        usual, found = asyncio.run(asked())
+    finally:
+        pool.stop()
+    # while no long one works, previews are answered where the last one was: its machines are read already
+    assert found[:2] == [usual, usual]
+    assert found[2] == found[3] != usual
+
+
+@pytest.mark.slow
+def test_previews_of_one_query_are_shared_by_the_processes():
+    """No process more is at work than there are, and none is left with most of them."""
+    pool = Pool(2, 10, 1)
+    pool.start()
+
+    async def asked():
+        return await asyncio.gather(*(pool.run(of_a_preview, Preview()) for _ in range(12)))
+
+    try:
+        # the first ones are asked while the processes begin
+        for _ in range(2):
+            counts = Counter(asyncio.run(asked()))
+    finally:
+        pool.stop()
+    assert len(counts) == 2
+    assert max(counts.values()) < 10
 
 
 def test_a_pool_that_has_not_begun_refuses():

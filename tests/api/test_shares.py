@@ -91,6 +91,36 @@ def test_a_group_that_is_busy_comes_after_one_that_is_not():
     GROUP.set("")
 
 
+def test_a_short_call_waits_for_short_ones_alone():
+    """Two at work, and one more aside while both are long ones; in turn among groups, as ever."""
+    gates, begun, threads = {}, [], FairThreads(2, "test", spare=True)
+
+    def asked(group, name):
+        GROUP.set(group)
+        gates[name] = threading.Event()
+        submit = threads.submit_short if name.startswith("s") else threads.submit
+        return submit(lambda: begun.append(name) or gates[name].wait(PATIENCE))
+
+    answers = [asked("A", name) for name in ("s0", "l0", "s1", "l1", "s2", "l2")]
+    until(lambda: len(begun) == 2)
+    # a short one and a long one work, all others wait; the group that has nothing at work comes first
+    answers += [asked("B", "l3"), asked("B", "s3")]
+    gates["s0"].set()
+    # now both are long, and short ones are answered aside, one at a time, of the group that has fewest at work
+    until(lambda: len(begun) == 4)
+    assert begun[:3] == ["s0", "l0", "l3"]
+    for name in ("s1", "s2", "s3"):
+        gates[name].set()
+    until(lambda: len(begun) == 6)
+    assert set(begun[3:]) == {"s1", "s2", "s3"}
+    for gate in gates.values():
+        gate.set()
+    threads.shutdown()
+    assert sorted(begun[6:]) == ["l1", "l2"]
+    assert all(each.done() for each in answers)
+    GROUP.set("")
+
+
 def test_calls_that_wait_end_with_their_threads():
     gate, threads = threading.Event(), FairThreads(1, "test")
     threads.submit(gate.wait)

@@ -10,15 +10,11 @@ from typer.testing import CliRunner
 
 import rcsa_ident as ri
 from rcsa_ident.cli import app
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.virtual.rotor import frequency_response, rotor
+from tests.fixtures.hit import OMEGA, write_hit
 from tests.fixtures.paths import MACHINES
-
-FREQUENCY = np.arange(200.0, 3501.0, 4.0)
-OMEGA = 2.0 * np.pi * FREQUENCY
 
 
 def run(*arguments):
@@ -28,25 +24,7 @@ def run(*arguments):
 @pytest.fixture(scope="module")
 def hit(tmp_path_factory):
     """The sample machine, hit at the tips of both toolings and in front of their flanges, X alone, without noise."""
-    folder = tmp_path_factory.mktemp("hit")
-    machine = read_machine(MACHINES / "hpm.toml")
-    text = ['[campaign]\nname = "hit"\n[toolings]']
-    tests = []
-    for path in machine.toolings:
-        tooling = read_tooling(path)
-        (folder / path.name).write_text(path.read_text())
-        text.append(f'{tooling.name} = "{path.name}"')
-        z = tooling.assembly.stickout + sum(s.length for s in tooling.assembly.holder[:-1])
-        model = rotor(machine.spindle, tooling.assembly, points={"v": z})
-        value = frequency_response(model, OMEGA, 0.0, ("tip.x",), ("tip.x", "v.x"))[:, :, 0]
-        for k, (place, name) in enumerate((('"tip"', "tip"), (f"{1e3 * z:.6f}", "v"))):
-            write_frf_csv(folder / f"{tooling.name}-{name}.csv", FREQUENCY, {"X": value[:, k]})
-            tests.append(
-                f'[[frfs]]\nid = "{tooling.name} {name}"\ntooling = "{tooling.name}"\naxis = "X"\nresponse = "tip"\nforce = {place}\n'
-                f'file = "{tooling.name}-{name}.csv"\n'
-            )
-    (folder / "campaign.toml").write_text("\n".join(text) + "\n" + "".join(tests))
-    return folder
+    return write_hit(tmp_path_factory.mktemp("hit"))
 
 
 def test_check_tells_what_is_used(hit):
@@ -105,10 +83,3 @@ def test_a_curve_that_is_mostly_outside_its_band_is_named(hit, tmp_path):
     found = run("check", folder)
     assert found.exit_code == 2
     assert "6 lines from 3480 to inf Hz, allowed is at least 20 lines in its band" in found.stderr.replace("\n", " ")
-
-
-def test_the_service_refuses_what_it_does_not_take(hit):
-    from api.reading.campaign_text import declare
-
-    with pytest.raises(InputError, match="frfs: found hammer tests, allowed is a campaign of cuts: the service does not take"):
-        declare({"frfs": [], "toolings": {}}, lambda name: None)

@@ -80,24 +80,14 @@ def beside(tmp_path_factory):
     """A campaign of the sample machine with a pair of accelerometers 350 mm behind the flange's face, beside all other sensors."""
     machine = read_machine(MACHINES / "hpm.toml")
     spindle = replace(machine.spindle, housing_positions=(0.35,))
-    plan = replace(machine.plan, spindle_speeds=tuple(np.linspace(8000.0, 20000.0, 12) * np.pi / 30.0))
+    plan = replace(machine.plan, spindle_speeds=tuple(np.linspace(8000.0, 20000.0, 2) * np.pi / 30.0))
     return simulate_campaign(replace(machine, spindle=spindle, plan=plan), tmp_path_factory.mktemp("beside") / "campaign", seed=5).folder
 
 
-@pytest.mark.slow(seconds=60)
-def test_from_displacement_and_a_pair_on_the_housing(beside, tmp_path):
+@pytest.mark.slow(seconds=15)
+def test_a_pair_on_the_housing_is_read_beside_displacement_sensors(beside):
     told = json.loads(run("check", beside, "--json").stdout)
-    assert told["usable"] == told["cuts"] == 24
+    assert told["usable"] == told["cuts"] == 4
     assert not any(recording["notes"] for recording in told["recordings"])
-    found = run("identify", beside, "--out", tmp_path / "R.json", "--report", tmp_path / "R.html")
-    assert found.exit_code == 0, found.output
-    result = json.loads((tmp_path / "R.json").read_text())
-    assert result["status"] == "converged"
-    assert {name: sensor.get("role") for name, sensor in result["sensors"].items() if sensor["quantity"] == "acceleration"} == {
-        "fixture_x": "fixture",
-        "fixture_y": "fixture",
-        "housing_x": "spindle",
-        "housing_y": "spindle",
-    }
-    assert "flange over tip force" in (tmp_path / "R.html").read_text()
-    assert within(tmp_path / "R.json", (0.01, 0.01, 0.05))
+    # displacement sensors see the flange: nobody asks for a third tooling
+    assert "three toolings" not in told["too_few"]

@@ -1,4 +1,5 @@
-"""Rational fits beside implementations that others keep: vector fitting of network parameters, realization of an impulse response."""
+"""Rational fits beside implementations that others keep: vector fitting of network parameters, realization of an impulse response,
+least-squares complex frequency."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ import warnings
 import control
 import numpy as np
 import pytest
+from sdypy import EMA
 from skrf import Network
 from skrf.vectorFitting import VectorFitting
 
@@ -63,3 +65,17 @@ def test_the_same_poles_as_a_realization_of_the_impulse_response(model):
     realized = np.sort_complex(poles[poles.imag > 0.0])
     fit = rational_fit(OMEGA, model.receptance(OMEGA).values, order=16)
     np.testing.assert_allclose(np.sort_complex(fit.pole), realized, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_the_same_modes_as_the_least_squares_complex_frequency_method(model):
+    """Told where the modes are, that of others finds them in receptances without noise; its lines begin at 0 Hz."""
+    hertz = np.arange(0.0, HERTZ[-1] + 1.0, 5.0)
+    values = model.receptance(2.0 * np.pi * hertz).values
+    other = EMA.Model(values[:, :, 0].T, hertz, lower=50, upper=HERTZ[-1], pol_order_high=60, frf_form="receptance")
+    other.get_poles(method="lscf", show_progress=False)
+    other.select_closest_poles(list(FREQUENCY))
+    pole = rational_fit(OMEGA, values[np.isin(hertz, HERTZ)], order=16).pole
+    pole = pole[np.argsort(np.abs(pole))]
+    np.testing.assert_allclose(np.abs(pole) / (2.0 * np.pi), other.nat_freq, rtol=3e-6)
+    np.testing.assert_allclose(-pole.real / np.abs(pole), other.nat_xi, rtol=1e-3)

@@ -1,8 +1,13 @@
 """Cuts on the virtual sample machine, prepared once for all tests of the room."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings
+from rcsa_ident.tool_holder.rough import rough_tool_holder
+from rcsa_ident.tool_holder.spread import Spread
 from tests.fixtures.virtual_shop import open_shop
 
 
@@ -24,3 +29,15 @@ def rich(shop):
     first, second = shop.truth
     cuts, _ = shop.measurements(np.random.default_rng(1), runout=1e-7, trigger={first: (0.7, False), second: (-0.4, False)})
     return shop.prepare(cuts[::3], spread=(0.05, 0.1, 0.0, 0.0)).with_smooth_errors(2e-3, 2)
+
+
+@pytest.fixture(scope="session")
+def rough(shop):
+    """The same cuts with drawings, sensors, depths and edge forces that are known roughly: shared holders, gains, delays, cross-talk."""
+    told = replace(shop.machine.workpiece.coefficients, tangential_edge=6e3, radial_edge=4e3)
+    cuts, _ = shop.measurements(np.random.default_rng(1), runout=1e-7, both_forces=True, believed=told)
+    data = shop.prepare(cuts[::3], spread=(0.05, 0.1, 0.9, 0.9))
+    drawings = {name: Drawing(shop.toolings[name].assembly, Spread(), "tool", "holder") for name in data.toolings}
+    holders = [rough_tool_holder(each.assembly, 4300.0) for each in drawings.values()]
+    data = data.with_scales(np.array([0.05, 0.07]), np.array([0.02, 0.02]), np.array([5e-6, 5e-6])).with_cross_talk(np.array([0.015, 0.02]))
+    return data.with_rough_toolings(rough_toolings(drawings), holders).with_smooth_errors(2e-3, 2)

@@ -14,7 +14,7 @@ from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout, unpack, with_places
+from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
@@ -22,7 +22,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.remarks import says
 from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, shares_of
 from rcsa_ident.virtual.rotor import frequency_response, rotor
-from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
+from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, oblique, open_shop
 from tests.identification.models import remade, vector_of
 
 #: Of the noise; not changed since these tests were first run.
@@ -210,22 +210,6 @@ def test_cuts_share_the_outputs_that_all_of_them_have(shop):
     assert shop.prepare(cuts).first().axes[0].lines.shape == shop.prepare(cuts).axes[0].lines.shape
 
 
-def test_a_vector_with_fewer_places_is_the_same_machine(data):
-    layout = Layout((AxisLayout(3, 2), AxisLayout(2, 2, softening=True)), 1)
-    theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
-    fewer, short = with_places(theta, layout, (1, 0))
-    assert [axis.places for axis in short.axes] == [1, 0]
-    assert fewer.size == short.size
-    for i, (old, new) in enumerate(zip(layout.axes, short.axes, strict=True)):
-        before, after = unpack(theta[layout.axis(i)], old), unpack(fewer[short.axis(i)], new)
-        for name in ("omega_n", "psi", "factor", "residual", "softening"):
-            np.testing.assert_allclose(getattr(after, name), getattr(before, name), rtol=1e-12)
-        np.testing.assert_allclose(after.places, before.places[:, : new.places])
-        np.testing.assert_allclose(after.place_residual, before.place_residual[: new.places])
-    np.testing.assert_array_equal(fewer[short.tail :], theta[layout.tail :])
-    assert with_places(theta, layout, (2, 2))[0] is theta
-
-
 def test_what_cannot_be_told_is_refused_by_name(shop, data):
     first = next(iter(shop.toolings))
     alone, both = cuts_of(shop, (first,)), shop.measurements(np.random.default_rng(1))[0]
@@ -243,3 +227,23 @@ def test_what_cannot_be_told_is_refused_by_name(shop, data):
     with pytest.raises(InputError) as caught:
         with_tests(data, [test], {})
     assert caught.value.field == "frfs"
+
+
+@pytest.mark.slow(seconds=40)
+def test_planes_that_feel_each_other_are_fitted_without_accelerometers_on_the_housing():
+    """Evidences of different lines cannot be compared: the flange's decide, and that the others were not used is said."""
+    shop = open_shop(6, lambda spindle: oblique(spindle, 15.0, 0.6))
+    cuts, delays = shop.measurements(np.random.default_rng(SEED), noise=2e-9, both_forces=True)
+    many = shop.prepare(beside(shop, cuts, delays, np.random.default_rng(SEED)))
+    assert many.beside
+    assert couplable(many)
+    quick = EvidenceSelection(search=SearchSettings(modes=4, population=2, generations=1, steps=2), candidates=1)
+    found = quick.run(many, 1)
+    assert found.whole is not None
+    assert says(found.notes, IdentificationCode.HOUSING_LEFT_OUT)
+    assert says(found.notes, IdentificationCode.PLANES_COUPLED)
+    plain = quick.run(shop.prepare(cuts), 1)
+    assert plain.whole is not None
+    assert not says(plain.notes, IdentificationCode.HOUSING_LEFT_OUT)
+    # the same lines decide in the end, and the same searches have begun
+    np.testing.assert_allclose(found.whole.best.theta, plain.whole.best.theta, rtol=1e-9)

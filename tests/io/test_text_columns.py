@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.io import text_columns
+from rcsa_ident.io.files import existing_file
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.io.time_base import Irregular, uniform
 from rcsa_ident.signals.recording import Quantity, Sensor
@@ -29,6 +31,21 @@ FORMATS = {
 }
 
 
+def line_by_line(path, field, largest):
+    """Blocks of a file: its header with the first line of numbers, then every line by itself, which the kernel reads where it is plain."""
+    lines = existing_file(path, field, largest).read_bytes().splitlines(keepends=True)
+    head = 2 + sum(line.startswith(b"#") for line in lines)
+    yield b"".join(lines[:head])
+    yield from lines[head:]
+
+
+@pytest.fixture(params=["whole", "line by line"])
+def parts(request, monkeypatch):
+    if request.param == "line by line":
+        monkeypatch.setattr(text_columns, "_blocks", line_by_line)
+
+
+@pytest.mark.usefixtures("parts")
 @pytest.mark.parametrize("text", FORMATS.values(), ids=FORMATS.keys())
 def test_formats(tmp_path, text):
     path = tmp_path / "cut.csv"
@@ -49,6 +66,22 @@ def test_empty_cells_are_lost_samples(tmp_path):
     path = tmp_path / "cut.csv"
     path.write_text("a,b\n1,\n,2\n")
     np.testing.assert_array_equal(read_recording(path, (A, B), 1.0).samples, [[1, np.nan], [np.nan, 2]])
+
+
+@pytest.mark.parametrize("name", ["comma", "german", "windows"])
+def test_a_long_table_takes_no_python_for_its_lines(tmp_path, monkeypatch, name):
+    """But for the first part, and with decimal commas or points beside semicolons the one in which they stand first."""
+    path = tmp_path / "cut.csv"
+    head, *lines = FORMATS[name].splitlines(keepends=True)
+    begin = lines[-1].index("2")
+    path.write_bytes("".join([head, *lines, *(f"{lines[-1][: begin - 1]}{i:02d}{lines[-1][begin + 1 :]}" for i in range(3, 100))]).encode())
+    monkeypatch.setattr(text_columns, "_PART", 200)
+    read, by_hand = text_columns.TextTable.columns, []
+    monkeypatch.setattr(text_columns.TextTable, "columns", lambda self, names: by_hand.extend(self.lines) or read(self, names))
+    recording = read_recording(path, (A, B))
+    assert recording.rate == 100.0
+    assert recording.samples.tolist() == EXPECTED + 97 * EXPECTED[2:]
+    assert 3 < len(by_hand) < 20
 
 
 def test_gaps_become_lost_samples(tmp_path):
@@ -90,6 +123,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.usefixtures("parts")
 @pytest.mark.parametrize(("text", "words"), BROKEN, ids=[f"{i}-{w[0]}" for i, (_, w) in enumerate(BROKEN)])
 def test_a_bad_file_is_answered_with_one_sentence(tmp_path, text, words):
     path = tmp_path / "cut.csv"

@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from rcsa_ident.signals import _kernels
 
@@ -41,6 +42,20 @@ def test_told_angles(kernel, reach):
     np.testing.assert_allclose(
         told, np.sum(np.imag(np.conj(mean) * turned) * order[:, None] / noise, axis=0), atol=1e-9 * information.max()
     )
+
+
+@pytest.mark.parametrize("price", [1e-6, 1.0, 1e9])
+@pytest.mark.parametrize("n", [3, 4, 5, 40])
+@pytest.mark.parametrize("kernel", compiled_and_plain("walked"))
+def test_walked(kernel, n, price):
+    rng = np.random.default_rng(5)
+    values, information = rng.standard_normal(n), rng.uniform(0.5, 50.0, n)
+    found, likelihood = kernel(values, information, price)
+    second = np.diff(np.eye(n), 2, axis=0)
+    np.testing.assert_allclose(found, np.linalg.solve(np.diag(information) + price * second.T @ second, information * values), atol=1e-7)
+    # what is left of the values without a straight line has the covariance of both, theirs and that of the walk
+    left = multivariate_normal(np.zeros(n - 2), second @ (second / information).T + np.eye(n - 2) / price).logpdf(second @ values)
+    assert likelihood == pytest.approx(left + 0.5 * (n - 2) * np.log(2.0 * np.pi) - 0.5 * np.sum(np.log(information)), abs=1e-6)
 
 
 @pytest.mark.parametrize("n", [5, 128, 311])
@@ -94,21 +109,22 @@ def turning(n):
 
 
 @pytest.mark.parametrize("highest", [0, 3, 9])
+@pytest.mark.parametrize("length", [31, 128, 150])
 @pytest.mark.parametrize("kernel", compiled_and_plain("angle_sums"))
-def test_angle_sums(kernel, highest):
+def test_angle_sums(kernel, length, highest):
     rng = np.random.default_rng(4)
-    samples, angle, window, starts = rng.normal(size=(90, 2)), turning(90), rng.uniform(size=31), np.array([0, 17, 59])
-    found = kernel(samples, angle, starts, window, highest)
+    samples, angle, window, starts = rng.normal(size=(240, 2)), turning(240), rng.uniform(size=length), np.array([0, 17, 59])
+    found = kernel(samples, _kernels.turned(angle), starts, window, highest)
     for block, s in zip(found, starts, strict=True):
-        phase = np.exp(-1j * np.outer(np.arange(highest + 1), angle[s : s + 31]))
-        np.testing.assert_allclose(block, phase @ (window[:, None] * samples[s : s + 31]), atol=1e-11)
+        phase = np.exp(-1j * np.outer(np.arange(highest + 1), angle[s : s + length]))
+        np.testing.assert_allclose(block, phase @ (window[:, None] * samples[s : s + length]), atol=1e-11)
 
 
 @pytest.mark.parametrize("kernel", compiled_and_plain("angle_signal"))
 def test_angle_signal(kernel):
     rng = np.random.default_rng(5)
     amplitude, angle = rng.normal(size=(2, 6, 2)) + 1j * rng.normal(size=(2, 6, 2)), turning(300)
-    found = kernel(amplitude, angle, 150)
+    found = kernel(amplitude, _kernels.turned(angle), 150)
     for w in range(2):
         phase = np.exp(1j * np.outer(angle[150 * w : 150 * (w + 1)], np.arange(6)))
         np.testing.assert_allclose(found[150 * w : 150 * (w + 1)], (phase @ amplitude[w]).real, atol=1e-11)

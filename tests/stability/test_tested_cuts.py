@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, Verdict, tally
+from rcsa_ident.units import from_rpm
 
 
 def test_four_cases_and_the_marginal_ones():
@@ -44,3 +45,25 @@ def test_every_cut_is_counted_once(rows):
 def test_what_is_not_counted(speed, depth, limit, words):
     with pytest.raises(InputError, match=words):
         tally(TestedCuts(np.array(speed), np.array(depth), (Verdict.STABLE,)), np.array(limit))
+
+
+def test_labels_that_contradict_each_other_are_named():
+    speed = from_rpm(np.array([7200.0, 7200.0, 7200.0, 8000.0, 8000.0, 9000.0]))
+    words = ("stable", "chatter", "stable", "stable", "chatter", "marginal")
+    cuts = TestedCuts(speed, np.array([0.5, 1.0, 1.25, 1.0, 1.1, 1.0]) * 1e-3, tuple(map(Verdict, words)))
+    (told,) = cuts.contradictions
+    assert told == ("at 7200 rev/min a cut of 1.25 mm was stable and one of 1 mm chattered: the labels contradict each other")
+
+
+def test_the_same_cut_of_two_tables_counts_once_and_twice_within_one():
+    one = TestedCuts(np.array([500.0, 500.0]), np.array([1e-3, 1e-3]), (Verdict.STABLE, Verdict.STABLE))
+    two = TestedCuts(np.array([500.0, 600.0]), np.array([1e-3, 1e-3]), (Verdict.STABLE, Verdict.CHATTER), np.array([np.nan, 4000.0]))
+    both = one.joined(two)
+    assert both.spindle_speed.tolist() == [500.0, 500.0, 600.0]
+    assert both.chatter_frequency[2] == 4000.0
+    assert len(TestedCuts.none().joined(one).verdict) == 2
+
+
+def test_a_chatter_frequency_is_above_zero():
+    with pytest.raises(InputError, match="chatter_frequency"):
+        TestedCuts(np.array([500.0]), np.array([1e-3]), (Verdict.CHATTER,), np.array([0.0]))

@@ -97,11 +97,18 @@ _CLIPPED = """() => {
 }"""
 
 
-def test_toolings_side_by_side_stand_in_sight(opened, shop: str):
-    page = opened(f"#/change?machine={shop}&tooling=T1&tooling=T1-long", viewport={"width": 1440, "height": 900})
+def test_toolings_side_by_side_stand_in_sight(opened, client: Client, shop: str):
+    """With names as long as those of the example."""
+    names = ("Example S3-PG25-long", "Example S4-PG25-short")
+    for name in names:
+        client.write_tooling(name, by_hand.TOOLING)
+    chosen = "&".join(f"tooling={name}" for name in names)
+    page = opened(f"#/change?machine={shop}&{chosen}", viewport={"width": 1440, "height": 900})
     table = page.locator(".scrolls", has=page.get_by_role("table", name="Toolings side by side"))
     expect(table).to_contain_text("Removes", timeout=60_000)
     assert table.evaluate("(e) => e.scrollWidth <= e.clientWidth")
+    for name in names:
+        client.forget_tooling(name)
 
 
 def test_lists_show_their_choice_whole(opened, client: Client, served: Served, shop: str, tmp_path: Path):

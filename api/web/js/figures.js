@@ -155,7 +155,8 @@ function labelled(tops, speeds, top, box) {
     y: depth,
     text: words,
     showarrow: false,
-    yshift: shift,
+    // the highest one is written larger: it keeps off its diamond
+    yshift: k === 0 ? shift + 3 : shift,
     font: { color: ink, size, weight: k === 0 ? 700 : 400 },
     bgcolor: colour("paper", 0.75),
     borderpad: 1,

@@ -70,6 +70,13 @@ export async function nextStep(machine, words) {
       `“${best.name}” has ${best.usable} usable cuts of ${best.cuts}. ${words}`,
       link(to(`campaigns/${best.id}`), "Identify it from them", "button primary"),
     );
+  const hit = campaigns.findLast((each) => each.hammer_tests && !each.missing && !each.cuts);
+  if (hit)
+    return empty(
+      title,
+      `“${hit.name}” has ${hit.hammer_tests} hammer tests. ${words}`,
+      link(to(`campaigns/${hit.id}`), "Identify it from them", "button primary"),
+    );
   const last = campaigns.at(-1);
   if (last)
     return empty(

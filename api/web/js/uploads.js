@@ -8,6 +8,10 @@ const PIECE = 4e6;
 const TRIES = 5;
 const queues = new Map();
 
+/** The files that a campaign names, of cuts, in the air and of hammer tests, each with `uploaded`. */
+export const namedFiles = (campaign) =>
+  [...campaign.cuts.flatMap((cut) => [cut.cut, cut.air]), ...campaign.hammer_tests.map((test) => test.file)].filter(Boolean);
+
 /** The uploads of a campaign; they go on while other views are looked at. */
 export function queueFor(id) {
   if (!queues.has(id)) queues.set(id, new Queue(id));
@@ -33,7 +37,7 @@ class Queue extends EventTarget {
 
   /** Put files in the queue that the campaign names; others are kept aside in `strangers`. */
   add(campaign, files) {
-    const names = new Set(campaign.cuts.flatMap((cut) => [cut.cut.name, cut.air?.name]).filter(Boolean));
+    const names = new Set(namedFiles(campaign).map((file) => file.name));
     this.strangers = files.filter((file) => !names.has(file.name)).map((file) => file.name);
     const given = new Map(files.map((file) => [file.name, file]));
     // in the campaign's order: verdicts come from the top

@@ -56,11 +56,8 @@ class CoupledData:
 
 
 def couplable(data: IdentificationData) -> bool:
-    """Whether both planes can be fitted together: the flange's lines in X and Y with as many outputs, and both forces in each.
-
-    Accelerometers on the housing beside do not count: both planes together are fitted without them.
-    """
-    if tuple(a.axis for a in data.axes) != (Dof.X, Dof.Y) or len({a.first().outputs for a in data.axes}) > 1 or not data.of_flange:
+    """Whether both planes can be fitted together: the flange's lines in X and Y with as many outputs, and both forces in each."""
+    if tuple(a.axis for a in data.axes) != (Dof.X, Dof.Y) or len({a.outputs for a in data.axes}) > 1 or not data.of_flange:
         return False
     return all(a.across.size == a.omega.size for a in data.axes)
 
@@ -73,7 +70,6 @@ def coupled_data(data: IdentificationData) -> CoupledData:
     data : IdentificationData
         For which `couplable` holds.
     """
-    data = data.first()
     x, y = data.axes
     key = [(axis.cut * 2**20 + np.rint(axis.order).astype(np.int64)) for axis in data.axes]
     points = np.unique(np.concatenate(key))

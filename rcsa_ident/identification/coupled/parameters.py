@@ -314,7 +314,7 @@ def skew_chain(part: FloatArray, layout: CoupledLayout) -> FloatArray:
 
 
 def side_by_side(x: AxisParameters, y: AxisParameters) -> CoupledParameters:
-    """Return two planes that feel nothing of each other as one machine, the modes of X first; of other places the first, the fixture."""
+    """Return two planes that feel nothing of each other as one machine, the modes of X first."""
     m, first = x.order + y.order, x.order
     psi, fixture = np.zeros((m, DIRECTIONS)), np.zeros((m, 2))
     psi[:first, :2], psi[first:, 2:] = x.psi, y.psi

@@ -1,16 +1,16 @@
 // A campaign: every cut with its verdict, uploads as they come in, and the way on to the identification.
 import { get, getBlob, hasKey, send } from "../api.js";
-import { add, choices, fill, h, head, link, note, save } from "../dom.js";
+import { add, card, choices, fill, h, head, link, note, save } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { confirmed, failed } from "../forms.js";
 import { filling, makeExample } from "../next_step.js";
 import { go, keep, to } from "../router.js";
 import { knownMachines } from "../state.js";
-import { queueFor } from "../uploads.js";
+import { namedFiles, queueFor } from "../uploads.js";
 import { text } from "../units.js";
 import { identifyCard } from "./identify_card.js";
 import { recordingPanel } from "./recording.js";
-import { stateOf, verdictTable } from "./verdicts.js";
+import { hammerTable, stateOf, verdictTable } from "./verdicts.js";
 
 const SHOWN = [
   ["all", "All"],
@@ -26,6 +26,7 @@ export async function view({ id }, query, place) {
   const counts = h("section", { class: "card", "aria-label": "State" });
   const strangers = h("div");
   const list = h("div");
+  const hammer = h("div");
   const detail = h("div", { class: "view" });
   const next = h("div");
   const example = knownMachines().some((m) => m.id === campaign.machine && m.example);
@@ -33,7 +34,7 @@ export async function view({ id }, query, place) {
     place,
     head(
       campaign.name,
-      `${campaign.cuts.length} cuts, ${campaign.toolings.join(", ")}`,
+      [...counted(campaign), ...campaign.toolings].join(", "),
       link(`v1/campaigns/${id}/archive`, "Archive (ZIP)", "button quiet archive"),
       h("button", { type: "button", class: "quiet danger", onclick: remove }, "Delete"),
     ),
@@ -45,14 +46,15 @@ export async function view({ id }, query, place) {
     example
       ? null
       : dropZone(
-          "Drop recordings here",
+          campaign.hammer_tests.length ? "Drop recordings and FRFs here" : "Drop recordings here",
           "Files are known by their names; more than once does no harm.",
           (files) => queue.add(campaign, files),
           { small: true },
         ),
+    hammer,
     h(
       "section",
-      { class: "card" },
+      { class: "card", hidden: campaign.cuts.length === 0 },
       h(
         "header",
         null,
@@ -115,8 +117,8 @@ export async function view({ id }, query, place) {
     const items = [...queue.items.values()];
     const total = items.reduce((sum, item) => sum + item.file.size, 0);
     const sent = items.reduce((sum, item) => sum + (item.state === "done" ? item.file.size : Math.min(item.sent, item.file.size)), 0);
-    const files = campaign.cuts.flatMap((cut) => [cut.cut, cut.air]).filter(Boolean);
-    const names = new Map(files.map((file) => [file.name, file.uploaded]));
+    const tested = campaign.hammer_tests.filter((test) => test.file.uploaded).length;
+    const names = new Map(namedFiles(campaign).map((file) => [file.name, file.uploaded]));
     const uploaded = [...names.values()].filter(Boolean).length;
     const bad = campaign.cuts.filter((cut) => cut.verdict && !cut.verdict.usable).length;
     fill(
@@ -124,13 +126,17 @@ export async function view({ id }, query, place) {
       h(
         "dl",
         { class: "facts" },
-        number("Usable cuts", `${campaign.usable} of ${campaign.cuts.length}`),
-        number("Not usable", String(bad)),
+        campaign.cuts.length
+          ? [number("Usable cuts", `${campaign.usable} of ${campaign.cuts.length}`), number("Not usable", String(bad))]
+          : null,
+        campaign.hammer_tests.length ? number("Hammer tests", `${tested} of ${campaign.hammer_tests.length}`) : null,
         number("Files", `${uploaded} of ${names.size}`),
-        number(
-          "Coefficient",
-          campaign.workpiece?.tangential_coefficient_mpa ? text("pressure", campaign.workpiece.tangential_coefficient_mpa) : "–",
-        ),
+        campaign.cuts.length
+          ? number(
+              "Coefficient",
+              campaign.workpiece?.tangential_coefficient_mpa ? text("pressure", campaign.workpiece.tangential_coefficient_mpa) : "–",
+            )
+          : null,
       ),
       queue.running
         ? [
@@ -158,8 +164,9 @@ export async function view({ id }, query, place) {
   let asked = null;
   function onward() {
     const made = example ? filling(campaign) : null;
-    const ready = campaign.usable > 0 && !queue.running && (made?.done ?? true);
-    const mode = `${ready} ${campaign.usable}`;
+    const tested = campaign.hammer_tests.filter((test) => test.file.uploaded).length;
+    const ready = campaign.usable + tested > 0 && !queue.running && (made?.done ?? true);
+    const mode = `${ready} ${campaign.usable} ${tested}`;
     if (made && !made.done) add(counts, made.box);
     if (mode === asked) return;
     asked = mode;
@@ -183,6 +190,7 @@ export async function view({ id }, query, place) {
   }
   function draw() {
     rows();
+    fill(hammer, campaign.hammer_tests.length ? card("Hammer tests", null, hammerTable(campaign.hammer_tests, queue)) : null);
     state();
   }
   let drawing = false;
@@ -222,5 +230,11 @@ export async function view({ id }, query, place) {
     }
   }
 }
+
+/** What a campaign holds, in words. */
+const counted = ({ cuts, hammer_tests }) => [
+  ...(cuts.length ? [`${cuts.length} cuts`] : []),
+  ...(hammer_tests.length ? [`${hammer_tests.length} hammer tests`] : []),
+];
 
 const number = (name, value) => h("div", null, h("dt", null, name), h("dd", null, value));

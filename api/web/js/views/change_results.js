@@ -51,7 +51,6 @@ function comparison(found, summaries, question) {
     i,
     stickout: summaries[i]?.stickout_mm ?? null,
     best: recommended(found, i)[0] ?? null,
-    pocket: lobes.best_speeds[0] ?? null,
   }));
   const top = Math.max(...rows.map((r) => r.best?.removal_rate_cm3_per_min ?? 0));
   const column = (name, kind, value, digits = null) => ({
@@ -77,8 +76,6 @@ function comparison(found, summaries, question) {
     },
     column("Stickout", "length", (r) => r.stickout, 1),
     column("Stable at any speed", "depth", (r) => r.lobes.absolute_limit_mm),
-    column("Highest limit at", "speed", (r) => r.pocket?.spindle_speed_rpm),
-    limit("Stability limit", (r) => r.pocket),
     column("Recommended speed", "speed", (r) => r.best?.spindle_speed_rpm),
     column("Recommended depth", "depth", (r) => r.best?.recommended_depth_mm),
     limit("Stability limit", (r) => r.best),

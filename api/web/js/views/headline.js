@@ -138,8 +138,8 @@ export function reserve(found, question, pocket = null) {
 
 const bounds = (bound) =>
   ({
-    chatter: "chatter stands against more",
-    power: "the spindle's power stands against more",
-    torque: "the spindle's torque stands against more",
-    speed: "the highest speed",
+    chatter: "limited by chatter",
+    power: "limited by the spindle's power",
+    torque: "limited by the spindle's torque",
+    speed: "limited by the highest speed",
   })[bound] ?? bound;

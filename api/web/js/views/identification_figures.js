@@ -75,7 +75,7 @@ export function costFigure(trace, width) {
       annotations: placed(labels, width, longest),
       margin: { l: 56, r: 14, t: ROWS * ROW + 8, b: 44 },
       xaxis: axis("Time [s]", { rangemode: "tozero" }),
-      yaxis: axis("Misfit", { type: "log", exponentformat: "e", dtick: 1 }),
+      yaxis: axis("Misfit", { type: "log", exponentformat: "power", dtick: 1 }),
     },
     say: `Misfit over time: ${[...trace].map(([name, points]) => `${name}, ${points.at(-1)?.stage}, ${points.at(-1)?.cost.toPrecision(3)}`).join("; ")}.`,
   };

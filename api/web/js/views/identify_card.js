@@ -4,6 +4,13 @@ import { card, h } from "../dom.js";
 import { busy, failed, field, quantity, select } from "../forms.js";
 import { go } from "../router.js";
 
+/** What an identification would use, in words. */
+function source({ usable, cuts, hammer_tests }) {
+  const tested = hammer_tests.filter((test) => test.file.uploaded).length;
+  const parts = [...(cuts.length ? [`${usable} usable cuts`] : []), ...(tested ? [`${tested} hammer tests`] : [])];
+  return parts.join(" and ");
+}
+
 /** The next step, and what may be set for it. */
 export function identifyCard(campaign) {
   const seed = quantity("Seed", "none", 1, { name: "seed", hint: "The same seed gives the same result." });
@@ -25,7 +32,7 @@ export function identifyCard(campaign) {
       "div",
       { class: "row-of-buttons" },
       button,
-      h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about half a minute`),
+      h("span", { class: "soft" }, `from ${source(campaign)}; it takes about half a minute`),
     ),
     campaign.too_few ? h("p", { class: "soft" }, campaign.too_few) : null,
     h(

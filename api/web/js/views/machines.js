@@ -15,7 +15,7 @@ export async function view(_args, _query, place) {
   const box = h("div", { class: "view" });
   const zone = dropZone(
     "Drop a campaign here",
-    "Its folder, a ZIP of it, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV and other sound, MATLAB, Parquet, CSV).",
+    "Its folder, a ZIP of it, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV and other sound, MATLAB, Parquet, CSV), FRFs of hammer tests.",
     (files) => intake(box, files),
   );
   if (!machines.length) {
@@ -97,7 +97,7 @@ function makeCard() {
     h(
       "div",
       { class: "fields" },
-      field("Name", name, { name: "name", hint: "As people call it: HPM 800U" }),
+      field("Name", name, { name: "name", hint: "Such as HPM 800U" }),
       field("Where, or what", words, { name: "description" }),
     ),
     h("p", null, button),

@@ -166,9 +166,8 @@ function spectrumFigure({ frequency_hz: x, channels, harmonics_hz: harmonics }, 
     layout[panel.layoutKey] = axis(`[${panel.title}]`, {
       domain: panel.domain,
       type: "log",
-      exponentformat: "none",
+      exponentformat: "power",
       dtick: 1,
-      tickformat: ".0e",
       nticks: 5,
     });
     if (k === all.length - 1) layout.xaxis.anchor = panel.yaxis;

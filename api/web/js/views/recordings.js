@@ -18,7 +18,7 @@ export async function view({ id = null }, _query, place) {
     box,
     dropZone(
       "Drop a campaign here",
-      "Its folder, a ZIP of it, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV and other sound, MATLAB, Parquet, CSV).",
+      "Its folder, a ZIP of it, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV and other sound, MATLAB, Parquet, CSV), FRFs of hammer tests.",
       (files) => intake(box, files),
     ),
     campaigns.length
@@ -41,12 +41,16 @@ function campaignTable(campaigns) {
         { name: "Name", cell: (c) => link(to(`campaigns/${c.id}`), c.name) },
         { name: "Made", cell: (c) => new Date(c.created).toLocaleString() },
         { name: "Cuts", number: true, cell: (c) => String(c.cuts) },
+        ...(campaigns.some((c) => c.hammer_tests)
+          ? [{ name: "Hammer tests", number: true, cell: (c) => String(c.hammer_tests) }]
+          : []),
         { name: "Uploaded", number: true, cell: (c) => String(c.uploaded) },
         { name: "Usable", number: true, cell: (c) => String(c.usable) },
         {
           name: "State",
           cell: (c) => {
-            if (c.missing) return mark("idle", c.uploaded < c.cuts ? "files are missing" : "air cuts are missing");
+            if (c.missing) return mark("idle", c.uploaded < c.cuts || !c.cuts ? "files are missing" : "air cuts are missing");
+            if (!c.cuts) return mark("good", "complete");
             if (!c.usable) return mark("bad", "nothing usable");
             return c.without_air ? mark("doubt", "no air cuts") : mark("good", "complete");
           },

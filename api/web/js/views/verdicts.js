@@ -122,3 +122,27 @@ export function verdictTable(shown, queue, open, toggle) {
     },
   );
 }
+
+const place = (point) => (typeof point === "number" ? `${plain(point, 1)} mm from the tip` : point);
+
+/** A row for each hammer test. */
+export function hammerTable(tests, queue) {
+  const rows = tests.map((test) => {
+    const verdict = test.lines === null ? null : { usable: true, reasons: [], notes: [] };
+    return { test, state: stateOf({ cut: test.file, air: null, verdict }, queue) };
+  });
+  return table(
+    "Hammer tests",
+    [
+      { name: "Test", cell: ({ test }) => test.id },
+      { name: "State", cell: ({ state }) => mark(state.kind, state.words) },
+      { name: "Tooling", cell: ({ test }) => test.tooling },
+      { name: "Axis", cell: ({ test }) => test.axis },
+      { name: "Response", cell: ({ test }) => place(test.response) },
+      { name: "Force", cell: ({ test }) => place(test.force) },
+      { name: "Lines", number: true, cell: ({ test }) => (test.lines === null ? "–" : String(test.lines)) },
+      { name: "Why", cell: ({ state }) => h("div", { class: "why" }, said(state, queue)) },
+    ],
+    rows,
+  );
+}

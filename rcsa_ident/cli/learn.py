@@ -1,0 +1,132 @@
+"""learn: what new cuts teach."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rcsa_ident.cli.common import NOT_CONVERGED, Json, Seed, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.conditions import cut_of, idle_tip, share_of
+from rcsa_ident.cli.options import CutOptions, StiffnessSpread, TipOptions, takes_groups
+from rcsa_ident.cli.processes import Processes
+from rcsa_ident.errors import InputError
+from rcsa_ident.processes import workers
+from rcsa_ident.stability.methods import MethodName
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rcsa_ident.machine.learnt_tip import LearntTip
+    from rcsa_ident.machining_setup import CutSpec, Tooling
+    from rcsa_ident.workflows.learn_from_cuts import Believed
+
+
+@answers
+@takes_groups
+def learn(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="[RESULT.json|MODES.toml|LEARNT.json] TOOLING.toml",
+            help="What is believed before, and the tooling that cut; with --modes or --frf the tooling alone.",
+            show_default=False,
+        ),
+    ],
+    tests: Annotated[
+        Path,
+        typer.Option(
+            help="CUTS.csv: labelled cuts (spindle_speed_rpm, axial_depth_mm, verdict stable|chatter|marginal; chatter_frequency_hz where "
+            "it was measured).",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="LEARNT.json to write: lobes, advise and learn take it like a result.", show_default=False)],
+    tip: TipOptions,
+    cut: CutOptions,
+    method: Annotated[
+        MethodName,
+        typer.Option(help="Stability method of every draw's limits; later commands use the same one.", rich_help_panel="Speeds and method"),
+    ] = MethodName.FULL_DISCRETISATION,
+    stiffness_spread: StiffnessSpread = 0.05,
+    seed: Seed = 1,
+    processes: Processes = None,
+    json_: Json = False,
+) -> None:
+    """Learn from labelled cuts, stable or chatter, what modes, coefficients and limits they leave possible."""
+    from rcsa_ident.io.learnt_tips import believed as told
+    from rcsa_ident.io.learnt_tips import write_learnt_tip
+    from rcsa_ident.io.tested_cuts import read_tested_cuts, unused_columns
+    from rcsa_ident.stability.methods import METHODS
+    from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts
+
+    writable(out)
+    spec = cut_of(cut)
+    cuts = read_tested_cuts(tests)
+    remarks = [f"{tests}: the column {name} is left aside" for name in unused_columns(tests)]
+    belief, tooling, earlier = believed_of(files, tip, spec, stiffness_spread)
+    number = len(cuts.verdict)
+    if earlier is not None:
+        cuts = earlier.cuts.joined(cuts)
+        again = number - (len(cuts.verdict) - len(earlier.cuts.verdict))
+        remarks += [f"{again} of the labels are in {files[0]} already and count once"] if again else []
+    stages = Stages(quiet=json_)
+    with stages.stage("labels"), workers(processes) as pool:
+        chosen = METHODS[method]() if earlier is None else earlier.method
+        learnt = learn_from_cuts(belief, tooling, spec, cuts, chosen, None if earlier is None else earlier.model, seed, map=pool.map_many)
+    write_learnt_tip(out, learnt)
+    remarks += [*belief.remarks, *learnt.remarks]
+    summary = told(learnt)
+    if json_:
+        status = "suspect" if learnt.remarks else "converged"
+        about = {"labels": len(cuts.verdict), "status": status, "effective_draws": learnt.posterior.effective, "believed": summary}
+        about |= {"log_evidence": learnt.posterior.log_evidence, "method": learnt.method.name}
+        emit({**about, "warnings": remarks, "seconds": stages.seconds, "out": str(out)})
+    else:
+        from rcsa_ident.cli.tables import show_believed
+
+        show_believed(summary)
+        for remark in remarks:
+            warn(remark)
+        effective = f"{learnt.posterior.effective:.0f} effective draws"
+        say(f"written: {out} ({len(cuts.verdict)} labels, {effective}, {stages.seconds['labels']:.1f} s)")
+    if learnt.thin:
+        raise typer.Exit(NOT_CONVERGED)
+
+
+def believed_of(
+    files: Sequence[Path], tip: TipOptions, cut: CutSpec, stiffness_spread: float
+) -> tuple[Believed, Tooling, LearntTip | None]:
+    """Return what is believed before further labels, the tooling, and the tip that earlier labels have taught, if there is one."""
+    from rcsa_ident.cli.results import read_tip_source
+    from rcsa_ident.io.modes import read_modes_file
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.machine.learnt_tip import LearntTip
+    from rcsa_ident.workflows.learn_from_cuts import Believed, believed_of_learnt, believed_of_machine, believed_of_tap_test
+
+    alone = tip.modes is not None or bool(tip.frf)
+    if tip.modes is not None and tip.frf:
+        raise InputError("--modes and --frf", "both", "one of them")
+    if len(files) != (1 if alone else 2):
+        wanted = (
+            "TOOLING.toml alone"
+            if alone
+            else "RESULT.json, MODES.toml or LEARNT.json, then TOOLING.toml (or --modes or --frf and TOOLING.toml)"
+        )
+        raise InputError("files", f"{len(files)} files", wanted)
+    modes = tip.modes if tip.modes is not None else files[0] if not alone and files[0].suffix.lower() == ".toml" else None
+    if modes is not None:
+        found = read_modes_file(modes)
+        tooling = read_tooling(files[-1], tip_known=True)
+        own = None if found.coefficients is not None else cut.process(tooling.cutter).coefficients
+        return Believed(*found.uncertain_tip(own)), tooling, None
+    if alone:
+        tooling = read_tooling(files[0], tip_known=True)
+        return believed_of_tap_test(idle_tip(tip.frf or [], tip.frf_units), cut.process(tooling.cutter).coefficients), tooling, None
+    source = read_tip_source(files[0])
+    if isinstance(source, LearntTip):
+        return believed_of_learnt(source), read_tooling(files[1], tip_known=True), source
+    tooling = read_tooling(files[1])
+    coefficients = cut.process(tooling.cutter, source.workpiece).coefficients
+    return believed_of_machine(source, tooling, coefficients, share_of(stiffness_spread, "--stiffness-spread", 50.0)), tooling, None

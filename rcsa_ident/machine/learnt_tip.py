@@ -1,0 +1,138 @@
+"""The tip of one tooling as labelled cuts have taught it: draws of its modes, of the coefficients and of the limit's own error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
+from rcsa_ident.machining_setup import Tooling, Workpiece
+from rcsa_ident.stability.label_posterior import FEWEST, LabelModel, LabelPosterior
+from rcsa_ident.stability.methods import StabilityMethod
+from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tested_cuts import TestedCuts
+from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.uncertain_tip import TipLimits, UncertainTip
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+
+#: What is said of a posterior that few draws stand for.
+THIN = "only {:.0f} of the draws agree with the labels, fewer than {:.0f}: probabilities are rough"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LearntTip(TipSource):
+    """What is believed of a tooling's tip after labelled cuts, or before the first of them; it answers for that tooling alone.
+
+    Parameters
+    ----------
+    prior : UncertainTip
+    coefficients : CuttingCoefficients
+        Means before the labels.
+    method : StabilityMethod
+        That the limits were computed by: their error is that method's, too, so that no other one takes its place.
+    model : LabelModel
+    cuts : TestedCuts
+        Those that were learnt from.
+    posterior : LabelPosterior
+    """
+
+    prior: UncertainTip
+    coefficients: CuttingCoefficients
+    method: StabilityMethod
+    model: LabelModel
+    cuts: TestedCuts
+    posterior: LabelPosterior
+
+    @property
+    def band(self) -> None:
+        """Modes are told at all frequencies."""
+        return
+
+    @property
+    def workpiece(self) -> Workpiece:
+        """The coefficients as they were before the labels; what a draw differs by multiplies whatever a cut names."""
+        return Workpiece("of the labelled cuts", self.coefficients)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Labels that contradict each other, and a posterior that few draws stand for."""
+        return (*self.cuts.contradictions, *([THIN.format(self.posterior.effective, FEWEST)] if self.thin else []))
+
+    @property
+    def thin(self) -> bool:
+        """Whether so few of the draws agree with the labels that probabilities are rough."""
+        return self.posterior.effective < FEWEST
+
+    @cached_property
+    def middle(self) -> TipModes:
+        """Modes of the medians of all draws."""
+        return self.prior.at(np.median(self.posterior.z, axis=0))
+
+    def lines(self, beyond: float = 1.0) -> FloatArray:
+        """Return the frequencies that resolve its modes."""
+        del beyond
+        return self.middle.receptance().omega
+
+    def tip(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
+    ) -> TipModes:
+        """Return the modes in the middle of all draws, whatever tooling is named."""
+        del tooling, omega, spread, stiffness_spread
+        return self.middle
+
+    def drawn_limits(self, process: MillingProcess, speeds: FloatArray, max_depth: float, draws: int) -> tuple[FloatArray, FloatArray]:
+        """Return limits of the first draws, their errors included, shape (draws, n) [m], and the chatter frequencies [rad/s]."""
+        limits = TipLimits(self.prior, process, self.method, max_depth)(self.posterior.z[:draws], speeds)
+        places = np.unique(speeds, return_inverse=True)
+        error = self.posterior.errors(self.model.discrepancy, places[0])[:draws, places[1]]
+        # beyond the largest depth nothing was looked for, and no error makes a limit of it
+        found = np.where(limits.log_limit < np.log(max_depth) - 1e-9, np.exp(limits.log_limit + error), np.inf)
+        return found, limits.chatter
+
+    def limits(self, process: MillingProcess, speeds: FloatArray, max_depth: float, draws: int) -> StabilityLobes:
+        """Return the limits up to which one half of the draws is stable, and those of each draw.
+
+        Parameters
+        ----------
+        process : MillingProcess
+            With the coefficients' means.
+        speeds : array, shape (n,) [rad/s]
+            Rising.
+        max_depth : float [m]
+        draws : int
+            At most so many of the draws, and one at least.
+        """
+        # an error may bring a limit back from beyond the largest depth
+        deeper = max_depth * float(np.exp(2.0 * self.model.discrepancy.deviation))
+        drawn, chatter = self.drawn_limits(process, speeds, deeper, max(draws, 1))
+        drawn = np.where(drawn <= max_depth, drawn, np.inf)
+        middle = np.quantile(drawn, 0.5, axis=0, method="nearest")
+        nearest = np.argmin(np.abs(np.where(np.isinf(drawn), max_depth, drawn) - np.minimum(middle, max_depth)), axis=0)
+        heard = np.where(np.isinf(middle), np.nan, chatter[nearest, np.arange(speeds.size)])
+        passing = process.cutter.teeth * speeds
+        lobe = np.where(np.isfinite(heard), np.floor(np.nan_to_num(heard) / passing), -1).astype(np.intp)
+        return StabilityLobes(speeds, middle, heard, lobe, max_depth, self.method.name, drawn=drawn)
+
+    def stable_by_draw(self, process: MillingProcess, cuts: TestedCuts) -> FloatArray:
+        """Return the probability of each draw that each cut is called stable, shape (r, n)."""
+        speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
+        deepest = 4.0 * float(cuts.axial_depth.max())
+        drawn, _ = self.drawn_limits(process, speeds, deepest, len(self.posterior.z))
+        return self.model.noise.stable(np.log(np.minimum(drawn, deepest))[:, place] - np.log(cuts.axial_depth))
+
+    def probabilities(self, process: MillingProcess, cuts: TestedCuts) -> FloatArray:
+        """Return the probability that each cut is called stable, shape (n,): the mean over all draws."""
+        found: FloatArray = self.stable_by_draw(process, cuts).mean(axis=0)
+        return found
+
+    def __str__(self) -> str:
+        return f"of one tooling, learnt from {len(self.cuts.verdict)} labelled cuts: {self.middle}"

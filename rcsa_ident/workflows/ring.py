@@ -1,0 +1,60 @@
+"""Sounds of a tooling that hangs on a string, and of its tool alone, to what its drawing does not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.ringing import RungTooling, learned
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.signals.ring_down import RingDown, ring_down
+
+
+class Channel(Protocol):
+    """A channel as a file tells it."""
+
+    @property
+    def samples(self) -> FloatArray: ...
+
+
+class Opened(Protocol):
+    """A recording as a file tells it: rate [Hz], channels, and whether it was compressed with loss."""
+
+    @property
+    def rate(self) -> float: ...
+    @property
+    def channels(self) -> Sequence[Channel]: ...
+    @property
+    def lossy(self) -> bool: ...
+
+
+def ring_tooling(tooling: Tooling, sounds: Sequence[Opened], bare_tool: Sequence[Opened] = (), mass: float | None = None) -> RungTooling:
+    """Return what sounds of a tooling, of its tool alone and the tool's mass tell together.
+
+    Parameters
+    ----------
+    tooling : Tooling
+        As drawn.
+    sounds : sequence of Opened
+        Of the tool in its holder, hanging free; the first channel of each is listened to.
+    bare_tool : sequence of Opened
+        Of the tool alone.
+    mass : float or None [kg]
+        Of the tool alone.
+
+    Raises
+    ------
+    InputError
+        Nothing is given, nothing rings, or it is another tool that rings.
+    """
+    if not sounds and not bare_tool and mass is None:
+        raise InputError("recording", "none", "the sound of a hit, of the tooling or of the tool alone, or the tool's mass")
+    return learned(tooling, _heard(sounds), _heard(bare_tool), mass)
+
+
+def _heard(sounds: Sequence[Opened]) -> RingDown | None:
+    if not sounds:
+        return None
+    return ring_down([(sound.rate, sound.channels[0].samples) for sound in sounds], any(sound.lossy for sound in sounds))

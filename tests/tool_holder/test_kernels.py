@@ -1,0 +1,32 @@
+"""The kernel of reduced tool-holders beside plain linear algebra; these tests run again without the compiler."""
+
+import numpy as np
+import pytest
+
+from rcsa_ident.tool_holder import _kernels as kernels
+
+
+@pytest.mark.parametrize("count", [1, 3, kernels.LANES + 5])
+def test_receptances_and_slopes_are_those_of_solved_systems(count):
+    rng = np.random.default_rng(count)
+    r, unknowns = 4, 2
+
+    def symmetric(scale, positive=True):
+        a = rng.standard_normal((r, r))
+        return scale * (a @ a.T + np.eye(r)) if positive else scale * (a + a.T)
+
+    matrices = np.array([symmetric(1.0), symmetric(30.0), symmetric(1e6), symmetric(1e4)])
+    changes = np.array([[symmetric(s, False) for s in (0.1, 3.0, 1e5, 1e3)] for _ in range(unknowns)])
+    loads, omega = rng.standard_normal((3, r)), rng.uniform(300.0, 3000.0, count)
+    values, slopes = np.empty((count, 5), dtype=complex), np.empty((count, 5, unknowns), dtype=complex)
+    kernels.reduced_receptances(matrices, loads, omega, changes, values, slopes)
+    pairs = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))
+    for f, w in enumerate(omega):
+        m, c, k, s = matrices
+        dynamic = k - w**2 * m + 1j * (s + w * c)
+        x = np.linalg.solve(dynamic, loads.T)
+        np.testing.assert_allclose(values[f], [loads[a] @ x[:, b] for a, b in pairs], rtol=1e-9)
+        for u, (dm, dc, dk, ds) in enumerate(changes):
+            change = dk - w**2 * dm + 1j * (ds + w * dc)
+            expected = [-x[:, a] @ change @ x[:, b] for a, b in pairs]
+            np.testing.assert_allclose(slopes[f, :, u], expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())

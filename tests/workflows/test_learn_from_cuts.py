@@ -1,0 +1,79 @@
+"""Learning from labels as a use case: the same answer however it is computed, and softening."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.machining_setup import BareCutter, CutSpec
+from rcsa_ident.stability.label_posterior import Effort, LabelModel
+from rcsa_ident.stability.next_test import most_telling
+from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.uncertain_tip import UncertainTip
+from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.units import from_rpm
+from rcsa_ident.workflows.learn_from_cuts import Believed, learn_from_cuts, next_tests
+from tests.stability.test_uncertain_tip import modes
+
+TOOLING, CUT = BareCutter("T", Cutter(2, 0.012)), CutSpec()
+EFFORT = Effort(120, 60, 1, 50)
+CUTS = TestedCuts(from_rpm(np.array([8000.0, 8000.0])), np.array([0.4e-3, 0.9e-3]), (Verdict.STABLE, Verdict.CHATTER))
+
+
+def believed(softening=0.0):
+    prior = UncertainTip.independent(modes(), np.array([[0.07] * 2, [0.3] * 2, [0.25] * 2]), (0.1, 0.2), softening)
+    return Believed(prior, CuttingCoefficients(9e8, 0.3))
+
+
+def test_it_does_not_matter_how_draws_are_divided():
+    """In one task or task by task from the end: the same draws."""
+
+    def backwards(function, tasks):
+        tasks = list(tasks)
+        return [function(task) for task in tasks[::-1]][::-1]
+
+    one, two = (learn_from_cuts(believed(), TOOLING, CUT, CUTS, ZeroOrder(), seed=3, effort=EFFORT, map=each) for each in (map, backwards))
+    assert np.array_equal(one.posterior.z, two.posterior.z)
+    assert np.array_equal(one.posterior.error, two.posterior.error)
+    other = learn_from_cuts(believed(), TOOLING, CUT, CUTS, ZeroOrder(), seed=4, effort=EFFORT)
+    assert not np.array_equal(one.posterior.z, other.posterior.z)
+
+
+def test_the_median_of_the_draws_is_the_limit():
+    learnt = learn_from_cuts(believed(), TOOLING, CUT, CUTS, ZeroOrder(), effort=EFFORT)
+    process, speeds = CUT.process(TOOLING.cutter, learnt.workpiece), from_rpm(np.array([8000.0, 10_000.0, 12_000.0]))
+    lobes = learnt.limits(process, speeds, 3e-3, 50)
+    assert lobes.drawn.shape == (50, 3)
+    ranked = np.sort(lobes.drawn, axis=0)
+    assert np.all((lobes.limit_depth >= ranked[24]) & (lobes.limit_depth <= ranked[25]))
+    # a cut as deep as the median is as likely stable as not, but for the boundary's own width
+    here = TestedCuts(speeds[:1], lobes.limit_depth[:1], (Verdict.MARGINAL,))
+    assert learnt.probabilities(process, here)[0] == pytest.approx(0.5, abs=0.1)
+
+
+def test_coefficients_of_another_material_keep_what_the_labels_taught():
+    """Twice the coefficients, half the limit of every draw."""
+    learnt = learn_from_cuts(believed(), TOOLING, CUT, CUTS, ZeroOrder(), effort=EFFORT)
+    speeds, twice = from_rpm(np.array([9000.0])), CutSpec(coefficients={"tangential": 18e8})
+    one, half = (learnt.limits(cut.process(TOOLING.cutter, learnt.workpiece), speeds, 50e-3, 50).drawn for cut in (CUT, twice))
+    assert half == pytest.approx(0.5 * one, rel=1e-6)
+
+
+def test_softening_is_one_more_number_of_each_draw():
+    learnt = learn_from_cuts(believed(1e-4), TOOLING, CUT, CUTS, ZeroOrder(), effort=EFFORT)
+    assert learnt.posterior.z.shape[1] == believed().prior.size + 1
+
+
+def test_next_tests_are_those_whose_labels_tell_most():
+    learnt = learn_from_cuts(believed(), TOOLING, CUT, TestedCuts.none(), ZeroOrder(), LabelModel(), effort=EFFORT)
+    process = CUT.process(TOOLING.cutter, learnt.workpiece)
+    speed = from_rpm(np.array([8000.0, 8000.0, 8000.0, 9000.0]))
+    among = TestedCuts(speed, np.array([0.01e-3, 0.5e-3, 40e-3, 0.7e-3]), (Verdict.MARGINAL,) * 4)
+    found = next_tests(learnt, process, 2, among, speed, 1e-3)
+    expected = most_telling(learnt.stable_by_draw(process, among), 2, np.random.default_rng(1))
+    assert [f.axial_depth for f in found] == [among.axial_depth[k] for k in expected]
+    assert {round(1e3 * f.axial_depth, 2) for f in found} == {0.5, 0.7}
+    free = next_tests(learnt, process, 3, None, from_rpm(np.arange(8000.0, 9001.0, 500.0)), 3e-3)
+    assert all(0.1 < f.probability_stable < 0.9 for f in free)
