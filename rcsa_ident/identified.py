@@ -12,10 +12,12 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.result import Identification, in_words
 from rcsa_ident.identification.status import Status
+from rcsa_ident.io.drawings import learned_of
 from rcsa_ident.io.identifications import identification_to_json, machine_from_json
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.tool_holder.learned import LearnedValue
 from rcsa_ident.workflows.identify import left_out, mode_deviations
 
 
@@ -68,6 +70,11 @@ class Result(Drawn):
     def left_out(self) -> dict[str, str]:
         """Cuts that were not used, each with the reason."""
         return {cut["id"]: cut["reason"] for cut in self.data["campaign"]["cuts_left_out"]}
+
+    @property
+    def learned(self) -> tuple[LearnedValue, ...]:
+        """Numbers of the toolings' drawings before and after the cuts, where drawings are not exact."""
+        return learned_of(self.data.get("toolings", {}))
 
     @cached_property
     def machine(self) -> IdentifiedMachine:

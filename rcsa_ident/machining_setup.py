@@ -20,6 +20,7 @@ from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPIN
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.tool_holder.drawings import Drawing
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.proportions import cutter_values, proportions
 from rcsa_ident.tool_holder.spread import EXACT, Spread
@@ -67,6 +68,11 @@ class Tooling(Saved):
 
     def __post_init__(self) -> None:
         proportions(self.assembly, self.cutter)
+
+    @property
+    def drawing(self) -> Drawing:
+        """What its drawing says, and how well that is known."""
+        return Drawing(self.assembly, self.spread, self.tool_model, self.holder_model)
 
     @property
     def whole_tool(self) -> tuple[BeamSegment, ...]:

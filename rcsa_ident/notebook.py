@@ -42,7 +42,7 @@ from rcsa_ident.report.forces import force_history
 from rcsa_ident.report.html import report_html
 from rcsa_ident.report.listening import listening_figure
 from rcsa_ident.report.lobes import map_figure, save_figure, stability_figure, surface_figure
-from rcsa_ident.report.summaries import mode_rows, two_digits
+from rcsa_ident.report.summaries import drawing_rows, mode_rows, two_digits
 from rcsa_ident.report.tap import tap_figure
 from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.signals.listening import Listening
@@ -293,6 +293,12 @@ def _(result: Result) -> str:
             for row in mode_rows(result.modes[Dof(axis.lower())], deviation)
         ]
         parts.append(_table((f"{axis}: f_n [Hz]", "ζ [%]", "|φ_t| [1e-3]", "|φ_r| [1e-3]"), rows))
+    if result.learned:
+        told = [
+            (row.toolings, row.what, f"{row.drawn} ± {row.spread}", f"{row.found} ± {row.deviation}", row.unit)
+            for row in drawing_rows(result.learned)
+        ]
+        parts.append(_table(("tooling", "", "drawn", "found", "unit"), told))
     found = result.identification
     drawn = [] if found is None else [figure_of(result, axis=axis) for axis in found.axes]
     return _page(result, *parts, _list(result.notes), *map(_svg, drawn))

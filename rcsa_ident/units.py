@@ -13,6 +13,8 @@ from rcsa_ident.errors import InputError, positive
 if TYPE_CHECKING:  # commands start without numpy
     from numpy.typing import NDArray
 
+#: Unit of drawings and tables for an SI unit, and how many of it that is; other units are shown as they are.
+SHOWN = {"m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}
 Number = TypeVar("Number", float, "NDArray[Any]")
 
 _RPM = 30.0 / math.pi

@@ -116,6 +116,19 @@ class AxisModes(Answer):
     misfit_per_point: float | None
 
 
+class LearnedNumber(Answer):
+    """A number of a drawing before and after the cuts."""
+
+    toolings: list[str] = Field(description="That share it.")
+    what: str
+    unit: str
+    drawn: float
+    spread: float = Field(description="Standard deviation of what is drawn.")
+    found: float
+    deviation: float = Field(description="Standard deviation of what is found.")
+    hardly_taught: bool = Field(description="Whether the cuts hardly taught it.")
+
+
 class Modes(Answer):
     """Modes of an identification, with standard deviations where it has them."""
 
@@ -125,6 +138,7 @@ class Modes(Answer):
     band_hz: list[float]
     axes: dict[str, AxisModes]
     both_planes: BothPlanesModes | None = Field(None, description="Where X and Y feel each other: the modes of both together.")
+    toolings: list[LearnedNumber] = Field([], description="What the cuts taught of toolings whose drawings are not exact.")
 
 
 class Frf(Answer):

@@ -229,6 +229,21 @@ class TestedTally(Answer):
     share_right: float | None = Field(description="Of the cuts that were stable or chattered.")
 
 
+class BandShare(Answer):
+    """What part of a band belongs to something."""
+
+    of: str
+    share: float = Field(description="Of the variance of the limit's logarithm; all shares together are 1.")
+
+
+class Band(Answer):
+    """What the band of the first recommended cut's stability limit consists of."""
+
+    deviation_percent: float = Field(description="Standard deviation of the limit.")
+    shares: list[BandShare]
+    in_words: str = Field(description="What dominates it and what helps; empty where nothing does, or the band is narrow.")
+
+
 class ToolingLobes(Answer):
     """Stability lobes of a tooling; a number that is null belongs to a cut that is stable up to the depth that was asked for."""
 
@@ -248,6 +263,7 @@ class ToolingLobes(Answer):
     recommended: list[RecommendedCut]
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
     recommended_by: str | None = Field(description="The method that computed best speeds and recommended cuts; null in a preview.")
+    band: Band | None = Field(None, description="null without machines drawn from the records, or without a recommended cut.")
     flip_speeds: int = Field(description="Speeds at which stability is lost by period doubling.")
     tested: TestedTally | None = Field(None, description="null: no tested cuts were given.")
     warnings: list[str]
@@ -355,6 +371,7 @@ class ToolingAdvice(Answer):
     common_stable_depth_mm: float | None = Field(description="Stable at every speed on all machines that the records allow.")
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
     recommended_by: str | None = Field(description="The method that computed the recommended cuts.")
+    band: Band | None = Field(None, description="null without machines drawn from the records, or without a recommended cut.")
     highest_removal: list[OperatingPoint]
     windows: list[Window]
     planned: list[PlannedAnswer]

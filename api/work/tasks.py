@@ -83,7 +83,8 @@ def modes(text: str) -> dict[str, Any]:
     if whole is not None:
         rows = [{key: mode.get(key) for key in _WHOLE_MODE} for mode in whole["modes"]]
         both = {"in_words": whole.get("in_words", ""), "modes": rows, "gyroscopic": whole["layout"]["turning"] != 0}
-    return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | {"axes": axes, "both_planes": both}
+    told = {"axes": axes, "both_planes": both, "toolings": data.get("toolings", {}).get("learned", [])}
+    return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | told
 
 
 def flange_frf(machine: MachineText, lines: tuple[float | None, float | None, float], work_seconds: float) -> dict[str, Any]:

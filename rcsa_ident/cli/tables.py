@@ -14,7 +14,17 @@ from rich.table import Table
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.report.summaries import ModeRow, RecordingRow, WholeModeRow, coefficient_rows, mode_rows, two_digits, whole_mode_rows
+from rcsa_ident.report.summaries import (
+    DrawingRow,
+    ModeRow,
+    RecordingRow,
+    WholeModeRow,
+    coefficient_rows,
+    drawing_rows,
+    mode_rows,
+    two_digits,
+    whole_mode_rows,
+)
 from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, PlannedCut, SpeedWindow
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.tested_cuts import Tally
@@ -104,10 +114,23 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
         )
     for each in coefficient_rows(found.coefficients):
         out.print(f"{escape(each.name)}: {two_digits(each.std, each.value)} ± {two_digits(each.std)} {each.unit}")
+    if found.learned:
+        show(_drawings(drawing_rows(found.learned)))
     for note in found.notes:
         if note == found.coupling:
             continue
         out.print(f"note: {escape(note)}")
+
+
+def _drawings(rows: Sequence[DrawingRow]) -> Table:
+    """What the drawings say of toolings, and what the cuts say."""
+    table = Table("tooling", "", "drawn", "±", "found", "±", "unit", "", title="toolings, as drawn and as found", title_justify="left")
+    for column in table.columns[2:6]:
+        column.justify = "right"
+    for row in rows:
+        texts = (row.toolings, row.what, row.drawn, row.spread, row.found, row.deviation, row.unit)
+        table.add_row(*map(escape, texts), "[yellow]hardly taught by the cuts[/]" if row.hardly else "")
+    return table
 
 
 def _modes(title: str, rows: Sequence[ModeRow | WholeModeRow], direction: Sequence[str] | None = None) -> Table:
@@ -141,6 +164,7 @@ def show_lobes(advice: Advice) -> None:
     for point in advice.recommended:
         table.add_row(f"{to_rpm(point.spindle_speed):.0f}", recommended_text(point), limit_text(point.limit, lobes.max_depth))
     show(table)
+    _tell_band(advice)
     _tell_unlimited(advice)
     peaks = ", ".join(f"{limit_text(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in advice.pockets)
     out.print(f"highest stability limits: {peaks}")
@@ -239,7 +263,14 @@ def show_points(advice: Advice) -> None:
             load = f"{to_cm3_per_min(p.removal_rate):.0f}", f"{1e-3 * p.power:.2f}", f"{p.torque:.1f}"
         table.add_row(*cells, *load, _against(p))
     show(table)
+    _tell_band(advice)
     _tell_unlimited(advice)
+
+
+def _tell_band(advice: Advice, about: str = "") -> None:
+    """Print what dominates the band of the first recommended cut's limit, where something does."""
+    if advice.band is not None and advice.band.words:
+        console().print(f"{about}first recommended cut: {escape(advice.band.words)}")
 
 
 def _against(point: OperatingPoint) -> str:
@@ -300,6 +331,7 @@ def show_comparison(answers: Sequence[Advice]) -> None:
         table.add_row(escape(answer.tooling), lowest_mm, *cells)
     show(table)
     for answer in answers:
+        _tell_band(answer, f"{escape(answer.tooling)}, ")
         _tell_unlimited(answer)
 
 

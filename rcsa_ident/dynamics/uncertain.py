@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import cached_property
 from typing import Protocol
 
@@ -22,6 +23,17 @@ CHANGE = 0.065
 WIDEST, GROWTH = 16.0, 0.1
 
 
+class Doubted(StrEnum):
+    """What the directions of a variation belong to; the machine is whatever is none of the others."""
+
+    CONTACT = "the contact of tool and holder"
+    TOOL = "the tool's fluted diameter and modulus"
+    LENGTHS = "the tool's stickout and lengths"
+    HOLDER = "the holder's diameter"
+    STIFFNESS = "the tool-holder's stiffness"
+    MACHINE = "the machine"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Variation:
     """Changes of a block of a receptance; the blocks of several variations do not overlap.
@@ -32,10 +44,16 @@ class Variation:
         Rows, and as well columns, of the receptance that the block covers, b of them.
     change : complex array, shape (p, n, b, b)
         Along each of p independent directions, per standard deviation.
+    common : int
+        So many of the last directions are the same ones in all variations.
+    unknowns : mapping of Doubted to array, shape (k, p)
+        What belongs to each, as k unknowns that move so far along the directions; of what is not named nothing is told.
     """
 
     members: tuple[int, ...]
     change: ComplexArray
+    common: int = 0
+    unknowns: Mapping[Doubted, FloatArray] = field(default_factory=dict)
 
 
 class Spread(Protocol):
@@ -77,15 +95,24 @@ class UncertainReceptance(Receptance):
         """Changes along all p independent directions, per standard deviation, shape (p, n, r, r); p is 0 without any."""
         r = len(self.rows)
         parts = self._variations()
-        found = np.zeros((sum(len(part.change) for part in parts), self.omega.size, r, r), dtype=complex)
-        first = 0
-        for part in parts:
-            own = slice(first, first + len(part.change))
+        count, directions = _directions(parts)
+        found = np.zeros((count, self.omega.size, r, r), dtype=complex)
+        for part, own in zip(parts, directions, strict=True):
             for i, row in enumerate(part.members):
                 for j, col in enumerate(part.members):
                     found[own, :, row, col] = part.change[:, :, i, j]
-            first += len(part.change)
         return found
+
+    def unknowns(self) -> dict[Doubted, FloatArray]:
+        """Return what the directions of `spread` belong to, shape (k, p) each: unknowns that move so far along them."""
+        parts = self._variations()
+        count, directions = _directions(parts)
+        rows: dict[Doubted, list[FloatArray]] = {}
+        for part, own in zip(parts, directions, strict=True):
+            for name, moves in part.unknowns.items():
+                rows.setdefault(name, []).append(np.zeros((len(moves), count)))
+                rows[name][-1][:, own] = moves
+        return {name: np.concatenate(each) for name, each in rows.items()}
 
     def deviation(self) -> dict[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]:
         """Return the standard deviations of real and imaginary part, shape (n,) each, of every entry that has one."""
@@ -123,7 +150,10 @@ class UncertainReceptance(Receptance):
         # one draw after the other, so that more draws begin with the same ones
         weights = [[rng.standard_normal(len(part.change)) for part in parts] for _ in range(draws)]
         for k, part in enumerate(parts):
-            change = _weighted(np.array([row[k] for row in weights]), part.change)
+            own = np.array([row[k] for row in weights])
+            if part.common:
+                own[:, -part.common :] = [row[0][-part.common :] for row in weights]
+            change = _weighted(own, part.change)
             for i, row in enumerate(part.members):
                 for j, col in enumerate(part.members):
                     found[:, :, row, col] += change[:, :, i, j]
@@ -184,7 +214,7 @@ class AtNodes:
         own = np.searchsorted(self.nodes, places).clip(max=self.nodes.size - 1)
         if not np.array_equal(self.nodes[own], places):
             return self.whole.at(places)
-        return tuple(Variation(each.members, each.change[:, own]) for each in self._kept)
+        return tuple(replace(each, change=each.change[:, own]) for each in self._kept)
 
     def guides(self) -> ComplexArray:
         """Return the curves of the whole."""
@@ -221,11 +251,20 @@ class Mixed:
     def at(self, places: Places) -> tuple[Variation, ...]:
         """Return the variations between those of both ends."""
         pairs = zip(self.first.at(places), self.second.at(places), strict=True)
-        return tuple(Variation(a.members, (1.0 - self.share) * a.change + self.share * b.change) for a, b in pairs)
+        return tuple(replace(a, change=(1.0 - self.share) * a.change + self.share * b.change) for a, b in pairs)
 
     def guides(self) -> ComplexArray:
         """Return the curves of both ends."""
         return np.concatenate([self.first.guides(), self.second.guides()])
+
+
+def _directions(parts: Sequence[Variation]) -> tuple[int, list[Places]]:
+    """How many directions there are in all, and which of them those of each variation are: own ones, then what is common."""
+    common = min((part.common for part in parts), default=0)
+    own = [len(part.change) - common for part in parts]
+    last = np.arange(sum(own), sum(own) + common)
+    firsts = np.cumsum([0, *own])
+    return sum(own) + common, [np.concatenate([np.arange(first, first + size), last]) for first, size in zip(firsts, own, strict=False)]
 
 
 def _weighted(weights: FloatArray, change: ComplexArray) -> ComplexArray:

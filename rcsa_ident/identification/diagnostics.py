@@ -20,7 +20,7 @@ from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING, FEWEST_TOOLINGS, Status
 from rcsa_ident.machine.flange_part import JointedFlange
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, says
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
 WORST_MODEL_ERROR = 0.02
@@ -40,6 +40,8 @@ HOUSING_ALONE = (
     "no sensor sees the flange: its receptance follows from how poles and zeros on the housing move from tooling to tooling, and tools in "
     "holders unlike those that cut may come out wrong by ten per cent and more; a displacement sensor at the flange settles it"
 )
+#: Said where lines stay unexplained and every drawing was taken as it is.
+EXACT_DRAWINGS = "the drawings are taken as exact: a table [spread] in a tooling's file lets the identification learn what they do not tell"
 _JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
 
 
@@ -103,6 +105,8 @@ def diagnose(
             causes = "drawings of the toolings or places of the hits may be wrong"
             if data.cuts:
                 causes = "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
+                if data.rough is None and not says(reasons, IdentificationCode.UNEXPLAINED):
+                    causes += f"; {EXACT_DRAWINGS}"
             doubt(
                 IdentificationCode.UNEXPLAINED,
                 f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained "

@@ -28,6 +28,7 @@ from rcsa_ident.shown import Shown
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
+from rcsa_ident.tool_holder.learned import LearnedValue
 
 
 class IdentificationCode(StrEnum):
@@ -180,6 +181,8 @@ class Identification(Shown):
         Where both planes had to be fitted together; `axes` then hold each plane at standstill, without the other one.
     toolings : KnownToolings or None
         What the cuts told of toolings whose drawings are not exact.
+    learned : tuple of LearnedValue
+        The same in the terms of the campaign's drawings.
     """
 
     status: Status
@@ -199,6 +202,7 @@ class Identification(Shown):
     sensors: tuple[Sensor, ...] = ()
     whole: CoupledPosterior | None = None
     toolings: KnownToolings | None = None
+    learned: tuple[LearnedValue, ...] = ()
 
     @property
     def at_minimum(self) -> bool:

@@ -12,15 +12,25 @@ from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.tool_holder.alteration import ALTERATIONS
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
+from rcsa_ident.tool_holder.learned import TERMS, LearnedValue
 from rcsa_ident.tool_holder.spread import LENGTHS
+from rcsa_ident.units import SHOWN
 
+_NUMBERS = ("drawn", "spread", "found", "deviation")
 _KINDS = ("tooling", "tool", "holder")
 #: Fields of an alteration that are lengths: the spreads that are, and the fluted part's.
 _LENGTHS = (*LENGTHS, "fluted_length")
 
 
-def known_toolings_to_json(known: KnownToolings) -> dict[str, Any]:
-    """Return what is known of toolings as a result holds it: each number in millimetres or percent, and the covariance in their spreads."""
+def known_toolings_to_json(known: KnownToolings, learned: Sequence[LearnedValue] = ()) -> dict[str, Any]:
+    """Return what is known of toolings as a result holds it: each number in millimetres or percent, and the covariance in their spreads.
+
+    Parameters
+    ----------
+    known : KnownToolings
+    learned : sequence of LearnedValue
+        The same in the terms of the drawings, for those who read it.
+    """
     rows = []
     for k, unknown in enumerate(known.unknowns):
         size = known.spread[k] * (1e3 if unknown.field in _LENGTHS else 100.0)
@@ -35,7 +45,26 @@ def known_toolings_to_json(known: KnownToolings) -> dict[str, Any]:
                 f"std_{unit}": float(size * known.deviation[k]),
             }
         )
-    return {"cut": list(known.toolings), "unknowns": rows, "covariance": known.covariance.tolist()}
+    told = {"learned": [_learned(each) for each in learned]} if learned else {}
+    return {"cut": list(known.toolings), **told, "unknowns": rows, "covariance": known.covariance.tolist()}
+
+
+def _learned(value: LearnedValue) -> dict[str, Any]:
+    """A number of a drawing before and after the cuts, in the unit that it is shown in."""
+    unit, size = SHOWN.get(value.unit, (value.unit, 1.0))
+    numbers = {name: getattr(value, name) * size for name in _NUMBERS}
+    return {"toolings": list(value.toolings), "what": value.words, "unit": unit, **numbers, "hardly_taught": value.hardly}
+
+
+def learned_of(toolings: Mapping[str, Any]) -> tuple[LearnedValue, ...]:
+    """Return the numbers of drawings before and after the cuts from a result's ``toolings``; none where the file holds none."""
+    fields = {words: field for field, (words, _) in TERMS.items()}
+    found = []
+    for row in toolings.get("learned", ()):
+        field = fields[row["what"]]
+        _, size = SHOWN.get(TERMS[field][1], ("", 1.0))
+        found.append(LearnedValue(field, tuple(row["toolings"]), *(row[name] / size for name in _NUMBERS)))
+    return tuple(found)
 
 
 def known_toolings_of(table: Table) -> KnownToolings:

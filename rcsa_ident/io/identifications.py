@@ -75,7 +75,9 @@ def identification_to_json(
         **({} if campaign.workpiece is None else {"workpiece": workpiece_keys(campaign.workpiece, all_spreads=True)}),
         "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
         "band_hz": [to_hz(w) for w in identification.band],
-        **({} if identification.toolings is None else {"toolings": known_toolings_to_json(identification.toolings)}),
+        **(
+            {} if identification.toolings is None else {"toolings": known_toolings_to_json(identification.toolings, identification.learned)}
+        ),
         "axes": _axes_to_json(identification, deviations or {}),
         **_both_planes(identification, deviations or {}),
         "delays": _delays(identification, campaign),

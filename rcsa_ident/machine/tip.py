@@ -15,7 +15,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling._kernels import changes_of_planes, tip_changes, tips_of_planes, tips_over
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
+from rcsa_ident.dynamics.uncertain import Doubted, Places, UncertainReceptance, Variation
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.drawings import FittedDrawing
@@ -27,6 +27,20 @@ from rcsa_ident.tool_holder.turning import both_planes, entries_at_speed
 _ENTRIES = ((0, 0), (0, 2), (0, 3), (2, 0), (3, 0), (2, 2), (2, 3), (3, 2), (3, 3))
 #: The same of receptances that are symmetric.
 _SYMMETRIC = ((0, 0), (0, 2), (0, 3), (2, 2), (2, 3), (3, 3))
+
+
+#: What the fields of an alteration belong to.
+_KINDS = {
+    "stickout": Doubted.LENGTHS,
+    "fluted_length": Doubted.LENGTHS,
+    "fluted_diameter": Doubted.TOOL,
+    "youngs_modulus": Doubted.TOOL,
+    "translational_stiffness": Doubted.CONTACT,
+    "rotational_stiffness": Doubted.CONTACT,
+    "translational_damping": Doubted.CONTACT,
+    "rotational_damping": Doubted.CONTACT,
+    "holder_diameter": Doubted.HOLDER,
+}
 
 
 def _none() -> ComplexArray:
@@ -287,28 +301,40 @@ class TipSpread:
         found = []
         for side, members in self._known:
             here = holder.tip(side.nominal[places])
-            rows = [] if side.doubt is None else [holder.changes(side, places), holder.tip(side.rivals[:, places]) - here]
-            if self.drawing.ends:
-                rows = self._with_drawing(side, places, rows)
+            machine = np.zeros((0, *here.shape), dtype=complex)
+            if side.doubt is not None:
+                machine = np.concatenate([holder.changes(side, places), holder.tip(side.rivals[:, places]) - here])
+            machine, open_, moves = self._with_drawing(side, places, machine)
+            kinds = [_KINDS[name] for name in self.drawing.fields]
             if stiffer is not None:
-                rows.append((stiffer.tip(side.nominal[places]) - here)[None])
-            change = np.concatenate(rows)
-            found.append(Variation(members, change if len(change) else np.zeros((1, *here.shape), dtype=complex)))
+                open_ = np.concatenate([open_, (stiffer.tip(side.nominal[places]) - here)[None]])
+                moves = np.pad(moves, ((0, 1), (0, 1)))
+                moves[-1, -1] = 1.0
+                kinds.append(Doubted.STIFFNESS)
+            unknowns = {kind: moves[[each is kind for each in kinds]] for kind in dict.fromkeys(kinds)}
+            change = np.concatenate([machine, open_])
+            if not len(change):
+                change, unknowns = np.zeros((1, *here.shape), dtype=complex), {}
+            # the tool-holder is the same one in both planes
+            found.append(Variation(members, change, len(open_), unknowns))
         return tuple(found)
 
-    def _with_drawing(self, side: Side, places: Places, rows: list[ComplexArray]) -> list[ComplexArray]:
-        """The machine's directions with the toolings that move along with them, and what the drawing leaves open beside the machine."""
+    def _with_drawing(self, side: Side, places: Places, machine: ComplexArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+        """The machine's directions with the toolings that move along with them, what the drawing leaves open beside the machine, and how
+        far each of the drawing's unknowns moves along all of these."""
+        count = len(self.drawing.ends)
+        if not count:
+            return machine, np.zeros((0, *machine.shape[1:]), dtype=complex), np.zeros((0, len(machine)))
         w = side.nominal[places]
         along = np.array([0.5 * (ahead.at(places).tip(w) - behind.at(places).tip(w)) for ahead, behind in self._ends])
-        known = self.drawing.known
-        if not known.size or side.doubt is None or not side.doubt.left.size:
-            return [*rows, along]
-        per_unit = along[: known.size] / self.drawing.deviation[:, None, None, None]
-        machine = np.concatenate(rows)
-        machine = machine + np.tensordot(side.doubt.shifts[:, known], per_unit, axes=1)
-        values, vectors = np.linalg.eigh(side.doubt.left[np.ix_(known, known)])
-        own = (vectors * np.sqrt(np.maximum(values, 0.0))).T
-        return [machine, np.tensordot(own, per_unit, axes=1), along[known.size :]]
+        shifts, root, known = np.zeros((len(machine), count)), np.eye(count), self.drawing.known
+        if known.size and side.doubt is not None and side.doubt.left.size:
+            first, deviation = slice(known.size), self.drawing.deviation
+            shifts[:, first] = side.doubt.shifts[:, known] / deviation
+            values, vectors = np.linalg.eigh(side.doubt.left[np.ix_(known, known)])
+            # the symmetric root, so that directions of both planes belong to the same unknowns
+            root[first, first] = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T / deviation
+        return machine + np.tensordot(shifts, along, axes=1), np.tensordot(root, along, axes=1), np.vstack([shifts, root]).T
 
     def guides(self) -> ComplexArray:
         """Return the tips of the rivals, each entry a curve."""

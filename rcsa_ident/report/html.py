@@ -25,6 +25,7 @@ from rcsa_ident.report.lobes import stability_figure
 from rcsa_ident.report.summaries import (
     advice_summary,
     coefficient_rows,
+    drawing_rows,
     lobes_summary,
     mode_rows,
     peak_row,
@@ -127,6 +128,7 @@ def report_html(
         notes=[note for note in found.notes if note != found.coupling],
         moved="housing" if says(found.reasons, IdentificationCode.HOUSING_ALONE) else "flange",
         scales=coefficient_rows(found.coefficients),
+        drawings=drawing_rows(found.learned),
         has_std=bool(deviations),
         softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values())
         or (found.whole is not None and found.whole.best.layout.softening),
@@ -296,6 +298,7 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
             stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable), f"lobes{number}"
         ),
         "recommended": [] if found is None else found["recommended"],
+        "band": "" if page.advice is None or page.advice.band is None else page.advice.band.words,
         "anywhere": None if found is None else found["absolute_limit_mm"],
         "critical": None if found is None else found["absolute_frequency_hz"],
     }

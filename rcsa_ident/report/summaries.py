@@ -20,9 +20,11 @@ from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.stability.advice import Advice, OperatingPoint, PlannedCut
+from rcsa_ident.stability.dominance import BandShares
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
-from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
+from rcsa_ident.tool_holder.learned import LearnedValue
+from rcsa_ident.units import SHOWN, to_cm3_per_min, to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +186,47 @@ def coefficient_rows(found: Mapping[ForceCoefficient, tuple[float, float]]) -> l
 
 
 @dataclass(frozen=True, slots=True)
+class DrawingRow:
+    """A number of a drawing before and after the cuts, as it is written.
+
+    Parameters
+    ----------
+    toolings, what, unit : str
+    drawn, spread, found, deviation : str
+        What the drawing says with its standard deviation, and what is believed now with its own.
+    hardly : bool
+        The cuts hardly taught it.
+    """
+
+    toolings: str
+    what: str
+    unit: str
+    drawn: str
+    spread: str
+    found: str
+    deviation: str
+    hardly: bool
+
+    def __str__(self) -> str:
+        return f"{self.toolings}: {self.what} {self.drawn} → {self.found} ± {self.deviation} {self.unit}"
+
+
+def drawing_rows(learned: Iterable[LearnedValue]) -> list[DrawingRow]:
+    """Return a row for each number of the toolings' drawings that was not exact."""
+    rows = []
+    for each in learned:
+        unit, size = SHOWN.get(each.unit, (each.unit, 1.0))
+        numbers = [[size * value for value in pair] for pair in ((each.drawn, each.spread), (each.found, each.deviation))]
+        # a contact has ten digits in front of its point
+        texts = [
+            (two_digits(std, value), two_digits(std)) if each.unit in SHOWN else (f"{value:.3g}", f"{std:.2g}") for value, std in numbers
+        ]
+        (drawn, spread), (found, deviation) = texts
+        rows.append(DrawingRow(", ".join(each.toolings), each.words, unit, drawn, spread, found, deviation, each.hardly))
+    return rows
+
+
+@dataclass(frozen=True, slots=True)
 class PeakRow:
     """Where a tip receptance is largest, and where its real part is lowest (which limits a cut)."""
 
@@ -225,6 +268,7 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
         "recommended_by": advice.recommended_by,
         "recommended": [_recommended(point, lobes) for point in advice.recommended],
         "withheld": lobes.withheld or None,
+        "band": band_summary(advice.band),
         "flip_speeds": int(lobes.flip.sum()),
         "tested": None if advice.tested is None else tally_summary(advice.tested),
     }
@@ -260,6 +304,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         "common_stable_depth_mm": None if common is None else finite(float(common.min()), 1e3),
         "withheld": advice.lobes.withheld or None,
         "recommended_by": advice.recommended_by,
+        "band": band_summary(advice.band),
         "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
         "windows": [
             {
@@ -272,6 +317,14 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         ],
         "planned": [_planned(cut) for cut in advice.planned],
     }
+
+
+def band_summary(band: BandShares | None) -> dict[str, Any] | None:
+    """Return what the band of the first recommended cut's limit consists of."""
+    if band is None:
+        return None
+    shares = [{"of": str(name), "share": share} for name, share in band.shares.items()]
+    return {"deviation_percent": 100.0 * band.deviation, "shares": shares, "in_words": band.words}
 
 
 def _recommended(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:

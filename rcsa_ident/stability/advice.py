@@ -12,6 +12,7 @@ from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Drawn, Shown
+from rcsa_ident.stability.dominance import BandShares
 from rcsa_ident.stability.pockets import peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
@@ -394,6 +395,8 @@ class Advice(Drawn):
         The speeds with the highest limits, the highest first.
     recommended_by : str or None
         The method that computed recommended cuts and pockets; None where nothing was to be recommended.
+    band : BandShares or None
+        What the band of the first recommended cut's limit consists of, where machines were drawn.
     """
 
     tooling: str
@@ -407,6 +410,7 @@ class Advice(Drawn):
     remarks: tuple[str, ...]
     pockets: tuple[Pocket, ...] = ()
     recommended_by: str | None = None
+    band: BandShares | None = None
 
     @property
     def common(self) -> FloatArray | None:

@@ -112,7 +112,7 @@ def drawn_limits(
     goes through it.
     """
     nodes = tip.thinned()
-    tips = _embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes)
+    tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes)
     return _ZERO_ORDER.depths(nodes.omega, tips, process, speeds, max_depth)
 
 
@@ -120,11 +120,11 @@ def both_directions(tip: Receptance) -> Receptance:
     """Return the tip's 2 x 2 receptance over ``tip.x`` and ``tip.y``; a direction that is missing is rigid."""
     if tip.rows == TIP and tip.cols == TIP:
         return tip
-    return Receptance(tip.omega, _embedded(tip.values, tip), TIP, TIP)
+    return Receptance(tip.omega, embedded(tip.values, tip), TIP, TIP)
 
 
-def _embedded(values: np.ndarray, tip: Receptance) -> np.ndarray:
-    """Values of a tip's receptance, shape (..., r, c), among zeros for the directions that are missing, shape (..., 2, 2)."""
+def embedded(values: np.ndarray, tip: Receptance) -> np.ndarray:
+    """Return values of a tip's receptance, shape (..., r, c), among zeros for the directions that are missing, shape (..., 2, 2)."""
     known = [(i, tip.rows.index(c), tip.cols.index(c)) for i, c in enumerate(TIP) if c in tip.rows and c in tip.cols]
     if not known:
         found = ", ".join(str(c) for c in tip.rows)

@@ -125,6 +125,8 @@ class FittedDrawing:
         With the most probable values of what its drawing does not tell.
     ends : tuple of (ToolAssembly, ToolAssembly), length k + n
         One standard deviation ahead and behind along each unknown: first those of which something is known, then its own.
+    fields : tuple of str, length k + n
+        Of `Alteration`, that they belong to.
     known : array of int, shape (k,)
         Which of `KnownToolings` the first ones are.
     deviation : array, shape (k,)
@@ -133,6 +135,7 @@ class FittedDrawing:
 
     assembly: ToolAssembly
     ends: tuple[tuple[ToolAssembly, ToolAssembly], ...] = ()
+    fields: tuple[str, ...] = ()
     known: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     deviation: FloatArray = field(default_factory=lambda: np.zeros(0))
 
@@ -176,7 +179,7 @@ def fitted(name: str, drawing: Drawing, known: KnownToolings | None = None) -> F
     if drawing.spread.exact:
         return FittedDrawing(drawing.assembly)
     told = {} if known is None else {unknown: k for k, unknown in enumerate(known.unknowns)}
-    owners = {(name, "tooling"), (drawing.tool_model, "tool"), (drawing.holder_model, "holder")}
+    owners = owners_of(name, drawing)
     of_holder = any((unknown.owner, unknown.kind) == (drawing.holder_model, "holder") for unknown in told)
     # another clamping than those that told of the contact: theirs is in what they told, its own comes on top
     elsewhere = known is not None and name not in known.toolings
@@ -200,7 +203,14 @@ def fitted(name: str, drawing: Drawing, known: KnownToolings | None = None) -> F
     deviation = np.zeros(0) if known is None else known.deviation[places]
     steps = [*((field, size) for field, size, _ in first), *own]
     ends = tuple((end(field, size), end(field, -size)) for field, size in steps)
-    return FittedDrawing(altered(drawing.assembly, by), ends, frozen(places, np.intp), frozen(deviation))
+    return FittedDrawing(
+        altered(drawing.assembly, by), ends, tuple(field for field, _ in steps), frozen(places, np.intp), frozen(deviation)
+    )
+
+
+def owners_of(name: str, drawing: Drawing) -> set[tuple[str, str]]:
+    """Return name and kind of everything that the unknowns of a tooling may belong to."""
+    return {(name, "tooling"), (drawing.tool_model, "tool"), (drawing.holder_model, "holder")}
 
 
 def _unknowns_of(name: str, drawing: Drawing, reclamped: float | None) -> dict[RoughUnknown, float]:

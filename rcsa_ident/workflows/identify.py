@@ -28,7 +28,8 @@ from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.sweep import measure_pass
 from rcsa_ident.signals.verdict import RecordCode, Verdict
-from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings
+from rcsa_ident.tool_holder.drawings import rough_toolings
+from rcsa_ident.tool_holder.learned import learned
 from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
 from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.turning import turning_pair
@@ -215,7 +216,9 @@ def of_campaign(found: Identification, campaign: Campaign) -> Identification:
     """Return the identification with what its machine has to know of the campaign, what is unusual about that, and shapes of cutters."""
     exact = () if found.toolings is not None or not campaign.rough else (Remark(IdentificationCode.DRAWINGS_EXACT, DRAWINGS_EXACT),)
     notes = tuple(dict.fromkeys((*found.notes, *exact, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
-    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes)
+    drawings = {name: tooling.drawing for name, tooling in campaign.toolings.items()}
+    told = () if found.toolings is None else learned(found.toolings, drawings)
+    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=told)
 
 
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:
@@ -285,7 +288,7 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
 def with_rough(data: IdentificationData, campaign: Campaign) -> IdentificationData:
     """Return the data whose tool-holders, depths and sensors are known as well as drawings and campaign say."""
     drawn = [campaign.toolings[name] for name in data.toolings]
-    rough = rough_toolings({t.name: Drawing(t.assembly, t.spread, t.tool_model, t.holder_model) for t in drawn})
+    rough = rough_toolings({t.name: t.drawing for t in drawn})
     if rough is None:
         return data
     depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]

@@ -24,6 +24,7 @@ from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
+from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.label_noise import LabelNoise
 from rcsa_ident.stability.lobes import DEEPER, DRAWS, both_directions, in_proportion, stability_lobes
@@ -276,7 +277,15 @@ def advise(
         tuple(dict.fromkeys([*change.remarks(lobes), *found.remarks])),
         found.pockets,
         found.by,
+        _band_of(change, found.points[0].spindle_speed, tolerance) if found.points and lobes.drawn is not None else None,
     )
+
+
+def _band_of(change: ToolChange, speed: float, tolerance: float) -> BandShares | None:
+    """What the band of the limit at a recommended speed consists of."""
+    tips = tips_over_speed(change.machine, change.tooling, change.omega, np.array([speed]), True, change.stiffness_spread)
+    ((_, tip),) = tips
+    return band_shares(tip, change.process, speed, change.max_depth, tolerance) if isinstance(tip, UncertainReceptance) else None
 
 
 @dataclass(frozen=True, slots=True)

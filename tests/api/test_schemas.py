@@ -1,7 +1,19 @@
-"""Schemas of the TOML files over REST."""
+"""Schemas of the TOML files over REST, and of answers that hold what was learned."""
 
+import numpy as np
+
+from api.schemas.machines import Modes
+from api.schemas.queries import Band, ToolingAdvice, ToolingLobes
+from api.work.tasks import modes
+from rcsa_ident.dynamics.uncertain import Doubted
+from rcsa_ident.io.drawings import known_toolings_to_json
 from rcsa_ident.io.schemas import SCHEMAS, schema_of
+from rcsa_ident.report.summaries import band_summary
+from rcsa_ident.stability.dominance import BandShares
+from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
+from rcsa_ident.tool_holder.learned import LearnedValue
 from tests.api.in_process import refused
+from tests.fixtures import by_hand
 
 
 def test_schemas_are_those_of_the_command(shop):
@@ -9,3 +21,25 @@ def test_schemas_are_those_of_the_command(shop):
     for name in SCHEMAS:
         assert client.schema(name) == schema_of(name)
     assert "tooling, campaign, machine, modes" in refused(404, client.schema, "result").detail
+
+
+def test_modes_tell_what_was_learned_of_toolings(tmp_path):
+    unknown = RoughUnknown("fluted_diameter", "T1", "tooling")
+    known = KnownToolings((unknown,), np.array([0.03]), np.array([0.38]), np.eye(1) * 0.01, ("T1",))
+    rows = (LearnedValue("fluted_diameter", ("T1",), 9.6e-3, 0.288e-3, 9.71e-3, 0.03e-3),)
+    told = Modes.model_validate(modes(by_hand.result_text(tmp_path, toolings=known_toolings_to_json(known, rows))))
+    (row,) = told.toolings
+    assert (row.what, row.unit, row.toolings, row.hardly_taught) == ("fluted diameter", "mm", ["T1"], False)
+    assert np.allclose([row.drawn, row.spread, row.found, row.deviation], [9.6, 0.288, 9.71, 0.03], rtol=1e-12)
+    assert Modes.model_validate(modes(by_hand.result_text(tmp_path))).toolings == []
+
+
+def test_a_band_tells_its_shares_and_its_sentence():
+    shares = {Doubted.CONTACT: 0.8, Doubted.MACHINE: 0.2}
+    told = Band.model_validate(band_summary(BandShares(1000.0, 0.31, shares)))
+    assert [(each.of, each.share) for each in told.shares] == [("the contact of tool and holder", 0.8), ("the machine", 0.2)]
+    assert told.deviation_percent == 31.0
+    assert told.in_words.startswith("80 % of the band of this limit (standard deviation 31 %) is the contact")
+    assert band_summary(None) is None
+    for answer in (ToolingAdvice, ToolingLobes):
+        assert answer.model_fields["band"].default is None

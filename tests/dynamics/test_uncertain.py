@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.uncertain import WIDEST, AtNodes, Mixed, UncertainReceptance, Variation
+from rcsa_ident.dynamics.uncertain import WIDEST, AtNodes, Doubted, Mixed, UncertainReceptance, Variation
 
 ROWS = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y), Coordinate("flange", Dof.X))
 OMEGA = 2.0 * np.pi * np.arange(100.0, 1000.0)
@@ -184,3 +184,35 @@ def test_a_spread_at_nodes_is_worked_out_there_once():
     assert other.nodes is None
     assert Mixed(spreads[0], ends[1], 0.5).nodes is None
     np.testing.assert_array_equal(ends[0].guides(), spreads[0].guides())
+
+
+@dataclass
+class Shared:
+    """One block of X and one of Y, two directions each, of which the last is the same one."""
+
+    covers = frozenset((0, 1))
+
+    def at(self, places):
+        rng = np.random.default_rng(3)
+        changes = rng.normal(size=(2, 2, OMEGA.size, 1, 1)) + 0j
+        unknowns = [{Doubted.CONTACT: np.array([[0.6, 0.8]])}, {Doubted.CONTACT: np.array([[0.8, 0.6]])}]
+        return tuple(Variation((i,), changes[i][:, places], 1, unknowns[i]) for i in range(2))
+
+    def guides(self):
+        return np.zeros((0, OMEGA.size), dtype=complex)
+
+
+def test_what_is_common_is_drawn_once_for_all_blocks():
+    tip = UncertainReceptance(OMEGA, known().values, ROWS, ROWS, Shared())
+    one, other = (part.change[:, :, 0, 0] for part in Shared().at(np.arange(OMEGA.size)))
+    spread = tip.spread
+    assert spread.shape == (3, OMEGA.size, 3, 3)
+    np.testing.assert_array_equal(spread[[0, 2], :, 0, 0], one)
+    np.testing.assert_array_equal(spread[[1, 2], :, 1, 1], other)
+    np.testing.assert_array_equal(tip.unknowns()[Doubted.CONTACT], [[0.6, 0.0, 0.8], [0.0, 0.8, 0.6]])
+    drawn = tip.drawn(4000, np.random.default_rng(2)) - tip.values
+    x, y = drawn[:, 100, 0, 0].real, drawn[:, 100, 1, 1].real
+    expected = np.real(one[1, 100] * other[1, 100])
+    sizes = np.sqrt(np.sum(one[:, 100].real ** 2) * np.sum(other[:, 100].real ** 2))
+    assert abs(np.mean(x * y) - expected) < 0.05 * sizes
+    assert abs(expected) > 0.2 * sizes

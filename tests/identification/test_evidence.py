@@ -10,6 +10,7 @@ import pytest
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
+from rcsa_ident.identification.diagnostics import EXACT_DRAWINGS
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.parameters import AxisLayout, Layout, parameter_names
@@ -318,6 +319,7 @@ def test_a_sensor_of_the_wrong_sign(shop):
     assert found.status is Status.SUSPECT
     assert found.axes[Dof.X].model_error > 0.05
     assert any(reason.code is IdentificationCode.UNEXPLAINED and reason.startswith("X:") for reason in found.reasons)
+    assert sum(EXACT_DRAWINGS in reason for reason in found.reasons) == 1
 
 
 def test_forces_that_are_not_those_of_the_cut(shop):

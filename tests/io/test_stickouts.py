@@ -40,3 +40,11 @@ def test_a_tool_that_nothing_holds_is_refused(path, stickout):
 def test_a_butt_joint_stays_one(path):
     path.write_text(path.read_text(encoding="utf-8").replace("insertion_mm = 40.0", "insertion_mm = 0.0"), encoding="utf-8")
     assert read_stickouts(path, [0.06])[0].assembly.insertion == 0.0
+
+
+def test_how_well_the_drawing_is_known_stays(path):
+    path.write_text(TOOLING + "[spread]\nfluted_diameter_percent = 1.5\n", encoding="utf-8")
+    base = read_tooling(path)
+    assert base.spread.fluted_diameter == pytest.approx(0.015)
+    for each in read_stickouts(path, [0.050, 0.090]):
+        assert (each.spread, each.tool_model, each.holder_model) == (base.spread, base.tool_model, base.holder_model)

@@ -10,14 +10,18 @@ import pytest
 
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
+from rcsa_ident.dynamics.uncertain import Doubted as DoubtedOf
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout, flange_modes, joint_of, pack, simple_axis
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine
 from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.tool_holder.alteration import Alteration, altered
+from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 from rcsa_ident.tool_holder.geometry import stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.spread import EXACT
 from tests.fixtures import by_hand
 from tests.machine.planes import BAND, FLANGES, JOINT, TIP, coupled_in_both_planes, oblique, tip_in_both_planes
 
@@ -58,12 +62,11 @@ def direct(tip, axis):
 
 
 def changes(tip, axis):
-    """Its changes along the directions that this axis knows of, shape (p, n); all of X stand before all of Y."""
-    i = AXES.index(axis)
-    half = np.split(tip.spread, 2)[i]
-    assert not np.any(half[:, :, 1 - i, :])
-    assert not np.any(half[:, :, :, 1 - i])
-    return half[:, :, i, i]
+    """Its changes along the directions that this axis knows of, shape (p, n); what it shares with the other one comes last."""
+    i, spread = AXES.index(axis), tip.spread
+    assert not np.any(spread[:, :, 0, 1])
+    assert not np.any(spread[:, :, 1, 0])
+    return spread[np.any(spread[:, :, i, i], axis=1), :, i, i]
 
 
 def coupled_by_hand(posterior, axis, assembly, x):
@@ -130,6 +133,85 @@ def test_the_last_row_is_the_holders_stiffness(assembly, speed, contact):
         )
         slope = 0.5 * (ahead - behind)
         assert np.linalg.norm(changes(found, axis)[-1] - slope) < 0.03 * np.linalg.norm(slope)
+    # one tool-holder in both planes
+    assert len(found.spread) == len(known.spread) + 1
+    assert np.all(np.any(found.spread[-1], axis=0)[[0, 1], [0, 1]])
+
+
+# drawings that are not exact
+
+
+#: So small that a standard deviation stays linear.
+MODULUS, CONTACT, STICKOUT = 1e-3, 5e-3, 2e-6
+ROUGH = replace(EXACT, stickout=STICKOUT, youngs_modulus=MODULUS, contact_stiffness=CONTACT)
+UNKNOWNS = (RoughUnknown("youngs_modulus", "T1", "tooling"), RoughUnknown("translational_stiffness", "T1", "tooling"))
+
+
+def told_with(machine):
+    """The machine whose unknowns hang on a modulus and a contact stiffness: a joint covariance, drawn once for both planes."""
+    rng = np.random.default_rng(7)
+    size = machine.identified[Dof.X].posterior.theta.size
+    root = np.vstack([2e-3 * rng.standard_normal((size, size + 2)) / np.sqrt(size), rng.uniform(-0.4, 0.4, (2, size + 2))])
+    whole = root @ root.T
+    cross, own = whole[:size, size:], whole[size:, size:]
+    identified = {
+        axis: replace(part, posterior=replace(part.posterior, covariance=whole[:size, :size], tooling_cross=cross, tooling_covariance=own))
+        for axis, part in machine.identified.items()
+    }
+    known = KnownToolings(UNKNOWNS, np.array([MODULUS, CONTACT]), np.array([0.5, -0.3]), own, ("T1",))
+    return replace(machine, identified=identified, toolings=known), whole
+
+
+def test_what_cuts_told_of_machine_and_tooling_together_is_the_tips_spread():
+    """Against the joint covariance with slopes of the coupled tip along every unknown of machine and tooling."""
+    machine, whole = told_with(machine_of(False))
+    tooling = replace(by_hand.tooling(), name="T1", spread=ROUGH)
+    found = machine.tip(tooling, OMEGA, stiffness_spread=0.0)
+    values = {"youngs_modulus": MODULUS * 0.5, "translational_stiffness": CONTACT * -0.3}
+    for axis in AXES:
+        posterior = machine.identified[axis].posterior
+
+        def tip(step, axis=axis, posterior=posterior):
+            """The coupled tip at a step of the unknowns; of stickout and rotational stiffness nothing was told."""
+            by = Alteration(
+                stickout=STICKOUT * step[-1],
+                rotational_stiffness=CONTACT * step[-2],
+                youngs_modulus=values["youngs_modulus"] + MODULUS * step[-4],
+                translational_stiffness=values["translational_stiffness"] + CONTACT * step[-3],
+            )
+            each = posterior.candidate(axis, posterior.theta + step[:-4])
+            holder = tool_holder_receptance(altered(tooling.assembly, by), OMEGA, axis)
+            return couple(holder, each.flange.receptance(OMEGA), each.joint)["tip", "tip"][:, 0, 0]
+
+        size = posterior.theta.size + 4
+        slopes = np.array([(tip(1e-3 * step) - tip(-1e-3 * step)) / 2e-3 for step in np.eye(size)])
+        covariance = np.zeros((size, size))
+        covariance[:-2, :-2], covariance[-2:, -2:] = whole, np.eye(2)
+        rows = changes(found, axis)
+        for part in (np.real, np.imag):
+            expected = np.einsum("in,ij,jn->n", part(slopes), covariance, part(slopes))
+            np.testing.assert_allclose(np.sum(part(rows) ** 2, axis=0), expected, rtol=0.02, atol=1e-4 * expected.max())
+
+
+def test_directions_tell_whose_they_are():
+    """In deviations of each unknown its moves have the size of one, and those of two are correlated as the cuts have told."""
+    machine, whole = told_with(machine_of(False))
+    found = machine.tip(replace(by_hand.tooling(), name="T1", spread=ROUGH), OMEGA)
+    told = found.unknowns()
+    assert {each: len(moves) for each, moves in told.items()} == {
+        DoubtedOf.TOOL: 2,
+        DoubtedOf.CONTACT: 2 * 2,
+        DoubtedOf.LENGTHS: 2,
+        DoubtedOf.STIFFNESS: 2,
+    }
+    correlation = whole[-2, -1] / np.sqrt(whole[-2, -2] * whole[-1, -1])
+    for plane_ in range(2):
+        modulus, contact = told[DoubtedOf.TOOL][plane_], told[DoubtedOf.CONTACT][2 * plane_]
+        assert modulus @ modulus == pytest.approx(1.0)
+        assert contact @ contact == pytest.approx(1.0)
+        assert modulus @ contact == pytest.approx(correlation)
+    # one stickout in both planes
+    np.testing.assert_array_equal(*told[DoubtedOf.LENGTHS])
 
 
 def test_modes_without_a_posterior_have_no_bands(assembly):

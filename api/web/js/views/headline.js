@@ -90,6 +90,7 @@ export function headline(found, question) {
             ]),
           )
         : null,
+      bandOf(found, i),
       cards === 1 ? reserve(found, question, lobes.recommended_by === null ? null : lobes.best_speeds[0]) : null,
       drawing,
       cardLink(lobes.tooling),
@@ -97,6 +98,12 @@ export function headline(found, question) {
   });
   return h("section", { class: `bests${cards === 1 ? " one" : ""}`, "aria-label": "Recommended cuts" }, articles);
 }
+
+/** What dominates the band of the recommended cut's limit, and what would narrow it. */
+const bandOf = (found, i) => {
+  const words = (found.advice?.[i] ?? found.lobes[i]).band?.in_words;
+  return words ? h("p", { class: "dominates" }, `${words}.`) : null;
+};
 
 /** Say that a recommended cut, which was to come, does not. */
 export function notComputed(best) {

@@ -121,6 +121,37 @@ function joint(values) {
   );
 }
 
+/** A number of a drawing and its standard deviation; contacts have ten digits in front of their point. */
+const numberOf = (value, spread) =>
+  Math.abs(value) < 1e5 ? withSpread(value, spread) : h("span", { class: "nowrap" }, power(value), h("span", { class: "soft" }, ` ± ${power(spread)}`));
+
+const power = (value) => {
+  const [digits, exponent] = value.toExponential(1).split("e");
+  return `${digits}·10${[...String(Number(exponent))].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`;
+};
+
+/** What the cuts taught of toolings whose drawings are not exact; what they hardly taught stands behind it. */
+export function drawings(modes) {
+  if (!modes.toolings?.length) return null;
+  const columns = [
+    { name: "Tooling", cell: (r) => r.toolings.join(", ") },
+    { name: "What", cell: (r) => [r.what, h("span", { class: "soft small nowrap" }, ` ${r.unit}`)] },
+    { name: "Drawn", number: true, cell: (r) => numberOf(r.drawn, r.spread) },
+    { name: "Found", number: true, cell: (r) => numberOf(r.found, r.deviation) },
+  ];
+  const [taught, hardly] = [false, true].map((wanted) => modes.toolings.filter((r) => r.hardly_taught === wanted));
+  const box = card(
+    "Toolings, as drawn and as found",
+    null,
+    taught.length ? table("Toolings, as drawn and as found", columns, taught) : h("p", null, "The cuts taught hardly anything of them."),
+    hardly.length
+      ? h("details", null, h("summary", null, `What the cuts hardly taught: ${hardly.length}`), table("Hardly taught", columns, hardly))
+      : null,
+  );
+  box.classList.add("wide");
+  return box;
+}
+
 /** What could not be told is as much of an answer as what could. */
 export function notes(modes) {
   const told = modes.notes.filter((each) => each !== modes.both_planes?.in_words);

@@ -79,6 +79,7 @@ function sheet({ name, machine, keys, question, found, software, versions }) {
       `The recommended depth stays 10 % below the stability limit${ofRecords}, with the speed right within 1 %.`,
       found.recommended_by ? ` Computed by ${found.recommended_by}.` : null,
       found.lowest === null ? null : [" Stable at any of the speeds below ", q("depth", found.lowest), "."],
+      found.band?.in_words ? ` First cut: ${found.band.in_words}.` : null,
     ),
     found.warnings.length ? note("doubt", h("strong", null, "Mind"), h("ul", null, found.warnings.map((each) => h("li", null, each)))) : null,
     h("h2", null, "Conditions"),

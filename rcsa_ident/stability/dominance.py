@@ -1,0 +1,129 @@
+"""What dominates the band of a stability limit: shares of the variance of its logarithm, and what would narrow it most."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.uncertain import Doubted, UncertainReceptance
+from rcsa_ident.shown import Shown
+from rcsa_ident.stability.lobes import DEEPER, embedded
+from rcsa_ident.stability.zero_order import ZeroOrder
+
+#: Standard deviation of the logarithm of a limit from which on its band matters: a depth that holds with 95 % is then 8 % lower, about
+#: what is kept in reserve anyway. Whoever holds this share of its variance dominates it.
+WIDE, DOMINANT = 0.05, 0.5
+#: Speeds within the tolerance at which the lowest limit is looked for.
+_SPEEDS = 9
+#: What helps.
+_HELP = {
+    Doubted.CONTACT: "tap it, ring it or cut once",
+    Doubted.TOOL: "ring the bare tool, or cut once",
+    Doubted.LENGTHS: "measure the stickout with a presetter",
+    Doubted.HOLDER: "tap it, ring it or cut once",
+    Doubted.STIFFNESS: "tap it or cut once",
+    Doubted.MACHINE: "more cuts narrow it",
+}
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class BandShares(Shown):
+    """What the band of a cut's limit consists of.
+
+    Parameters
+    ----------
+    spindle_speed : float [rad/s]
+        Within the tolerance of the recommended speed: where the limit is lowest.
+    deviation : float [-]
+        Standard deviation of the logarithm of the limit.
+    shares : mapping of Doubted to float
+        Of its square; their sum is 1.
+    """
+
+    spindle_speed: float
+    deviation: float
+    shares: Mapping[Doubted, float]
+
+    @property
+    def dominant(self) -> Doubted | None:
+        """What holds at least half of a band that matters; None where nothing does."""
+        if self.deviation < WIDE:
+            return None
+        return next((each for each, share in self.shares.items() if share >= DOMINANT), None)
+
+    @property
+    def words(self) -> str:
+        """A sentence on what dominates the band and what helps; empty where nothing does."""
+        if self.dominant is None:
+            return ""
+        share, wide = 100.0 * self.shares[self.dominant], 100.0 * self.deviation
+        return f"{share:.0f} % of the band of this limit (standard deviation {wide:.0f} %) is {self.dominant}: {_HELP[self.dominant]}"
+
+    def __str__(self) -> str:
+        return self.words or f"standard deviation of the limit {100.0 * self.deviation:.2g} %, nothing dominates it"
+
+
+def band_shares(tip: UncertainReceptance, process: MillingProcess, speed: float, max_depth: float, tolerance: float) -> BandShares | None:
+    """Return what the band of the limit near a speed consists of; None where some of the tip's spread is not known, or no limit is found.
+
+    Parameters
+    ----------
+    tip : UncertainReceptance
+    process : MillingProcess
+    speed : float [rad/s]
+        That is recommended.
+    max_depth : float [m]
+    tolerance : float
+        Share of the speed within which the lowest limit counts, as in `StabilityLobes.recommended_depth`.
+
+    Notes
+    -----
+    Linear, by the zero-order limit half a change ahead and behind along each direction of the tip's spread. What cuts could not tell
+    apart hangs together: a group's share is what its exact knowledge would take away after that of the groups before it, contact and
+    tool first and the machine last, so that an inexpensive remedy is named before an expensive one.
+    """
+    if not tip.complete:
+        return None
+    nodes = tip.thinned()
+    deepest, method = DEEPER * max_depth, ZeroOrder()
+    speeds = np.linspace((1.0 - tolerance) * speed, (1.0 + tolerance) * speed, _SPEEDS if tolerance > 0.0 else 1)
+
+    def limits(values: np.ndarray, at: FloatArray) -> FloatArray:
+        return method.depths(nodes.omega, embedded(values, nodes), process, at, deepest)
+
+    at = speeds[[int(np.argmin(limits(nodes.values[None], speeds)[0]))]]
+    change = nodes.spread
+    ends = [np.log(limits(nodes.values + sign * change, at)[:, 0]) for sign in (0.5, -0.5)]
+    if not np.all(np.isfinite(ends)):
+        return None
+    return shares_of(ends[0] - ends[1], nodes.unknowns(), float(at[0]))
+
+
+def shares_of(slopes: FloatArray, unknowns: Mapping[Doubted, FloatArray], speed: float) -> BandShares | None:
+    """Return shares of a variance by projection: group after group takes the part of the slopes that its unknowns span.
+
+    Parameters
+    ----------
+    slopes : array, shape (p,)
+        Change of the limit's logarithm along independent directions, per standard deviation.
+    unknowns : mapping of Doubted to array, shape (k, p)
+        See `Variation`; the rest is the machine's.
+    speed : float [rad/s]
+    """
+    whole = float(slopes @ slopes)
+    if whole == 0.0:
+        return None
+    shares, spanned, taken = {}, np.zeros((0, slopes.size)), 0.0
+    for each in Doubted:
+        if each not in unknowns:
+            continue
+        spanned = np.vstack([spanned, unknowns[each]])
+        _, size, directions = np.linalg.svd(spanned, full_matrices=False)
+        told = float(np.sum((directions[size > 1e-9 * size.max()] @ slopes) ** 2))
+        shares[each], taken = (told - taken) / whole, told
+    shares[Doubted.MACHINE] = 1.0 - taken / whole
+    return BandShares(speed, float(np.sqrt(whole)), shares)
