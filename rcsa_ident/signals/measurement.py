@@ -82,7 +82,7 @@ class CutMeasurement:
     @property
     def housing(self) -> bool:
         """Whether the lines are those of the spindle's housing alone, and none of the flange's."""
-        return not any(lines.of_flange for lines in self.axes.values())
+        return bool(self.axes) and not any(lines.of_flange for lines in self.axes.values())
 
 
 @dataclass(frozen=True, slots=True, repr=False)
