@@ -96,6 +96,8 @@ def _value(known: KnownToolings, field: str, which: tuple[int, ...], drawn: floa
     # a contact is its model's with what its own clamping adds
     change = float(size @ known.mean[places])
     before, after = float(np.linalg.norm(size)), float(np.sqrt(size @ known.covariance[np.ix_(places, places)] @ size))
+    # wider bands do not make less known than was known before
+    after = min(after, before)
     if field in _ADDED:
         return LearnedValue(field, toolings, drawn, before, drawn + change, after)
     found = drawn * exp(change)

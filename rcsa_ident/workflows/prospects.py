@@ -96,7 +96,8 @@ def together(
     omega = 2.0 * np.pi * np.linspace(*band_hz, JUDGED)
     wanted, floor = [], []
     for target in targets:
-        tip = machine.tip(target, omega, stiffness_spread=0.0)
+        # what its drawing leaves open is nothing that a cut of another tooling tells
+        tip = machine.tip(target.assembly, omega, stiffness_spread=0.0)
         # of both directions, as a mean of their relative variances
         norm = np.sqrt(2.0) * np.linalg.norm(np.einsum("njj->nj", tip.values), axis=0)
         change = tip.spread / norm
