@@ -19,6 +19,7 @@ from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPIN
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.tool_holder.drawings import Drawing
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.proportions import proportions
 from rcsa_ident.tool_holder.spread import EXACT, Spread
@@ -59,6 +60,11 @@ class Tooling(Saved):
 
     def __post_init__(self) -> None:
         proportions(self.assembly, self.cutter)
+
+    @property
+    def drawing(self) -> Drawing:
+        """Tool and holder as drawn, and how well that is known."""
+        return Drawing(self.assembly, self.spread, self.tool_model, self.holder_model)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

@@ -24,6 +24,7 @@ from rcsa_ident.cli import (  # noqa: E402
     export,
     forces,
     identify,
+    learn_toolings,
     listen,
     lobes,
     machine,
@@ -59,7 +60,7 @@ app = typer.Typer(
 )
 #: In the order of the work, under headings.
 _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
-    "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
+    "Identification": (demo.demo, identify.check, identify.identify, learn_toolings.learn, plan.plan, export.export),
     "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.holders, tools.draw),
     "Further measurements": (
         listen.listen,

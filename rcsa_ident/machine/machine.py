@@ -25,7 +25,7 @@ from rcsa_ident.machine.tip import Side, tip_over_sides
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.tip_modes import TipModes
-from rcsa_ident.tool_holder.drawings import Drawing, FittedDrawing, KnownToolings, fitted
+from rcsa_ident.tool_holder.drawings import FittedDrawing, KnownToolings, fitted
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.turning import turning_receptance
@@ -172,8 +172,7 @@ class Machine(TipSource, Drawn):
         """Return a tooling as it is believed to be, by what its drawing and the machine's cuts say; an assembly is exact."""
         if not isinstance(tooling, Tooling):
             return FittedDrawing(tooling)
-        drawing = Drawing(tooling.assembly, tooling.spread, tooling.tool_model, tooling.holder_model)
-        return fitted(tooling.name, drawing, self.toolings)
+        return fitted(tooling.name, tooling.drawing, self.toolings)
 
     def sides(self, omega: FloatArray) -> tuple[Side, ...]:
         """Return what a tip feels of the machine at some frequencies [rad/s]."""
