@@ -35,6 +35,7 @@ STUDIES = (
     "real_machine",
     "hammer",
     "rough",
+    "learn",
 )
 
 

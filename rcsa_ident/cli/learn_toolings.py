@@ -14,6 +14,9 @@ from rcsa_ident.cli.processes import Processes
 from rcsa_ident.errors import InputError
 from rcsa_ident.processes import workers
 
+#: Numbers from which on an exponent is easier to read.
+LARGE = 1e4
+
 if TYPE_CHECKING:
     from rcsa_ident.workflows.learn_toolings import LearntToolings
 
@@ -109,14 +112,13 @@ def _told(found: LearntToolings, written: dict[str, str]) -> dict[str, Any]:
 
 
 def _show(found: LearntToolings, written: dict[str, str]) -> None:
-    from rcsa_ident.report.summaries import two_digits
     from rcsa_ident.workflows.learn_toolings import told
 
     for each in found.toolings:
         say(f"{each.drawn.name}:")
         for row in told(each):
-            before = f"{two_digits(row.drawn_std, row.drawn)} ± {two_digits(row.drawn_std)}"
-            say(f"  {row.what} {before} → {two_digits(row.found_std, row.found)} ± {two_digits(row.found_std)} {row.unit}")
+            before = _with_deviation(row.drawn, row.drawn_std)
+            say(f"  {row.what} {before} → {_with_deviation(row.found, row.found_std)} {row.unit}")
         if each.contradiction:
             warn(f"{each.drawn.name} is not written: {each.contradiction}")
         else:
@@ -125,3 +127,10 @@ def _show(found: LearntToolings, written: dict[str, str]) -> None:
         say(f"note: {note}")
     if not found.converged:
         warn("the fit still gained when its steps ran out")
+
+
+def _with_deviation(value: float, std: float) -> str:
+    """A number with its standard deviation, with an exponent where it is large."""
+    from rcsa_ident.report.summaries import two_digits
+
+    return f"{value:.3g} ± {std:.2g}" if value >= LARGE else f"{two_digits(std, value)} ± {two_digits(std)}"
