@@ -64,7 +64,7 @@ class FurtherFit:
 
     @cached_property
     def covariance_of_all(self) -> FloatArray:
-        """Covariance of all unknowns, shape (p, p): the lines' information counts as that of an identification does, the prior's as it is."""
+        """Covariance of all unknowns, shape (p, p): lines count as in an identification, what was known before as it is."""
         prior = self.known.jacobian.T @ self.known.jacobian
         found: FloatArray = np.linalg.inv(prior + (self.solution.evaluation.hessian - prior) / WIDER**2)
         return 0.5 * (found + found.T)
@@ -133,7 +133,7 @@ def fit_further(data: IdentificationData, machine: KnownMachine, reclamped: floa
     """
     if data.rough is None:
         raise InputError("toolings", "drawings that are exact", "toolings with a [spread] table: nothing of others is to be learned")
-    data = data.summed().with_smooth_errors(SMOOTH_ERROR)
+    rough, data = data.rough, data.summed().with_smooth_errors(SMOOTH_ERROR)
     known, layout = machine.prior(data, reclamped), machine.layout(data)
     values = known.centre[layout.force][data.rough_place].copy()
     nuisance = np.zeros((len(data.cut_ids), 2))
@@ -143,7 +143,7 @@ def fit_further(data: IdentificationData, machine: KnownMachine, reclamped: floa
         fits = [_fit(part, machine, known, layout, start, nuisance[own], COARSE) for start in _starts(data, tooling, values)]
         best = min(fits, key=lambda fit: evidence(fit.solution, fit.misfit))
         nuisance[own] = best.solution.evaluation.nuisance
-        told = np.any(data.rough.weights[tooling], axis=0)
+        told = np.any(rough.weights[tooling], axis=0)
         values[told] = best.values[told]
     return _fit(data, machine, known, layout, values, nuisance, None)
 

@@ -113,7 +113,11 @@ class KnownMachine:
             links.append(np.hstack([each.covariance[:core, core:], cross[:core]]))
             found[here, here] = each.covariance[:core, :core]
             found[here, shared], found[shared, here] = links[i], links[i].T
-            found[joint, joint], found[joint, joint.stop :], found[joint.stop :, joint] = each.covariance[core:, core:], cross[core:], cross[core:].T
+            found[joint, joint], found[joint, joint.stop :], found[joint.stop :, joint] = (
+                each.covariance[core:, core:],
+                cross[core:],
+                cross[core:].T,
+            )
         if self.toolings is not None:
             found[tail + JOINT :, tail + JOINT :] = self.toolings.covariance
         if len(links) == 2:

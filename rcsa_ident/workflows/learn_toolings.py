@@ -152,7 +152,9 @@ def learn_toolings(machine: IdentifiedMachine, campaign: Campaign, readings: Seq
         keep = np.array([k for k, name in enumerate(data.cut_ids) if name not in out], dtype=np.intp)
         fit = fit_further(data.of_cuts(keep), known, max(campaign.toolings[name].spread.spindle_joint for name in used))
     toolings = tuple(_learnt(campaign.toolings[name], fit, k) for k, name in enumerate(data.toolings))
-    return LearntToolings(toolings, data.toolings, _taught(machine, fit.machine(known)), fit.misfit.model_error, fit.solution.converged, tuple(notes))
+    return LearntToolings(
+        toolings, data.toolings, _taught(machine, fit.machine(known)), fit.misfit.model_error, fit.solution.converged, tuple(notes)
+    )
 
 
 def _learnt(drawn: Tooling, fit: FurtherFit, place: int) -> LearntTooling:
@@ -226,4 +228,6 @@ def _row(learnt: LearntTooling, field: str) -> Learnt:
     what, unit = _WORDS.get(field, (f"{field.replace('_', ' ')} of the contact", _CONTACT_UNITS.get(field, "")))
     before, after, was, is_ = getattr(learnt.before, field), getattr(learnt.deviation, field), value(drawn), value(found)
     # lengths have a deviation in metres, all else one of its logarithm
-    return Learnt(what, unit, was, 1e3 * before if field in _LENGTHS else was * before, is_, 1e3 * after if field in _LENGTHS else is_ * after)
+    return Learnt(
+        what, unit, was, 1e3 * before if field in _LENGTHS else was * before, is_, 1e3 * after if field in _LENGTHS else is_ * after
+    )

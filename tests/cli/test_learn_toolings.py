@@ -35,7 +35,9 @@ def name(one_cut):
 
 @pytest.mark.slow(5)
 def test_a_cut_of_another_machine_contradicts_and_nothing_is_written(result_file, one_cut, tmp_path):
-    found = run("learn", result_file, one_cut, "--toolings", tmp_path / "out", "--machine", tmp_path / "NEW.json", "--json", "--processes", 1)
+    found = run(
+        "learn", result_file, one_cut, "--toolings", tmp_path / "out", "--machine", tmp_path / "NEW.json", "--json", "--processes", 1
+    )
     assert found.exit_code == 3, found.output
     answer = json.loads(found.stdout)
     (tooling,) = answer["toolings"]

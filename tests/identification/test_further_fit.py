@@ -60,9 +60,7 @@ def error(machine, assembly, shop, clamped):
     """Of the tip, the worse of X and Y."""
     true = np.einsum("nii->ni", shop.tips(clamped.assembly, 8000.0 * np.pi / 30.0))
     tip = machine.tip(assembly, TIP_OMEGA, spread=False)
-    return max(
-        np.linalg.norm(tip.between(f"tip.{a}", f"tip.{a}") - true[:, i]) / np.linalg.norm(true[:, i]) for i, a in enumerate(AXES)
-    )
+    return max(np.linalg.norm(tip.between(f"tip.{a}", f"tip.{a}") - true[:, i]) / np.linalg.norm(true[:, i]) for i, a in enumerate(AXES))
 
 
 @pytest.mark.slow(40)

@@ -93,4 +93,3 @@ def test_a_learned_tooling_is_written_and_read_again(campaign, tmp_path):
 def test_cuts_that_contradict_are_named(error, moved, said):
     fit = SimpleNamespace(misfit=SimpleNamespace(model_error=(0.01, error)), surprise=lambda place: moved)
     assert said in learning._contradiction(fit, 0)
-
