@@ -11,7 +11,7 @@ from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.toolings import write_tooling
 from rcsa_ident.machining_setup import HammerTest
 from rcsa_ident.tool_holder.alteration import Alteration
-from rcsa_ident.tool_holder.drawings import KnownToolings, RoughToolings, RoughUnknown
+from rcsa_ident.tool_holder.drawings import KnownToolings, RoughToolings, RoughUnknown, rough_toolings
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from rcsa_ident.workflows import learn_toolings as learning
 from tests.fixtures import by_hand
@@ -93,3 +93,18 @@ def test_a_learned_tooling_is_written_and_read_again(campaign, tmp_path):
 def test_cuts_that_contradict_are_named(error, moved, said):
     fit = SimpleNamespace(misfit=SimpleNamespace(model_error=(0.01, error)), surprise=lambda place: moved)
     assert said in learning._contradiction(fit, 0)
+
+
+def test_another_clamping_in_a_known_holder_differs_by_both_clampings(campaign):
+    """Its own scatter, and that of the clamping that told of the model's contact."""
+    drawn = replace(campaign.toolings["T1"], holder_model="PG25")
+    known = KnownToolings((RoughUnknown("rotational_stiffness", "PG25", "holder"),), np.array([0.4]), np.zeros(1), np.eye(1), ("T2",))
+    spreads = {}
+    for told in (None, known):
+        found = rough_toolings({"T1": drawn.drawing}, told)
+        spreads[told is None] = dict(zip(found.unknowns, found.spread.tolist(), strict=True))
+    model, own = RoughUnknown("rotational_stiffness", "PG25", "holder"), RoughUnknown("rotational_stiffness", "T1", "tooling")
+    assert spreads[True][model] == pytest.approx(np.hypot(0.4, 0.1))
+    assert own not in spreads[True]
+    assert spreads[False][model] == pytest.approx(0.4)
+    assert spreads[False][own] == pytest.approx(np.sqrt(2.0) * 0.1)
