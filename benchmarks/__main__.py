@@ -36,6 +36,7 @@ STUDIES = (
     "hammer",
     "rough",
     "labelled_cuts",
+    "learn",
 )
 
 

@@ -177,7 +177,9 @@ def _drawn_truth(told: MachineFile, toolings: Mapping[str, Tooling], rng: np.ran
     return RoughMachine(told, toolings, true, alterations, *pair)
 
 
-def rough_campaign(scratch: Path, seed: int, cut: Sequence[str] = CUT, name: str = "campaign") -> tuple[RoughMachine, Path]:
+def rough_campaign(
+    scratch: Path, seed: int, cut: Sequence[str] = CUT, name: str = "campaign", speeds: Sequence[int] | None = None
+) -> tuple[RoughMachine, Path]:
     """Return a rough machine and the folder of its campaign, simulated if it is not there.
 
     Parameters
@@ -188,11 +190,15 @@ def rough_campaign(scratch: Path, seed: int, cut: Sequence[str] = CUT, name: str
         Toolings that cut.
     name : str
         Of the folder.
+    speeds : sequence of int, optional
+        Which of the plan's speeds, by their number; all by default.
     """
     machine = rough_machine(scratch, seed)
     folder = scratch / f"rough-{seed}" / name
     if folder.is_dir():
         return machine, folder
+    if speeds is not None:
+        machine = _at_speeds(machine, speeds)
     told = replace(machine.told, toolings=tuple(p for p in (*machine.told.toolings, *machine.told.truth_toolings) if p.stem in cut))
     first = machine.true[cut[0]][0]
     truths = (true_receptances(*machine.true[each]) for each in machine.toolings)
@@ -203,6 +209,16 @@ def rough_campaign(scratch: Path, seed: int, cut: Sequence[str] = CUT, name: str
         made.truth.rename(truth_of(folder))
         made.folder.rename(folder)
     return machine, folder
+
+
+def _at_speeds(machine: RoughMachine, speeds: Sequence[int]) -> RoughMachine:
+    """The machine with a plan of some of its speeds alone."""
+
+    def fewer(file: MachineFile) -> MachineFile:
+        return replace(file, plan=replace(file.plan, spindle_speeds=tuple(file.plan.spindle_speeds[k] for k in speeds)))
+
+    true = {name: (fewer(setup), tooling) for name, (setup, tooling) in machine.true.items()}
+    return replace(machine, told=fewer(machine.told), true=true)
 
 
 def truth_of(campaign: Path) -> Path:

@@ -29,22 +29,41 @@ def learn(
     files: Annotated[
         list[Path],
         typer.Argument(
-            metavar="[RESULT.json|MODES.toml|LEARNT.json] TOOLING.toml",
-            help="What is believed before, and the tooling that cut; with --modes or --frf the tooling alone.",
+            metavar="[RESULT.json|MODES.toml|LEARNT.json] TOOLING.toml|CAMPAIGN_DIR",
+            help="What is believed before, and the tooling whose labelled cuts --tests tells (with --modes or --frf the tooling alone); "
+            "or RESULT.json and a campaign of toolings that are new to the machine, written by --toolings.",
             show_default=False,
         ),
     ],
+    tip: TipOptions,
+    cut: CutOptions,
     tests: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             help="CUTS.csv: labelled cuts (spindle_speed_rpm, axial_depth_mm, verdict stable|chatter|marginal; chatter_frequency_hz where "
             "it was measured).",
-            show_default=False,
         ),
-    ],
-    out: Annotated[Path, typer.Option(help="LEARNT.json to write: lobes, advise and learn take it like a result.", show_default=False)],
-    tip: TipOptions,
-    cut: CutOptions,
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="LEARNT.json to write of labelled cuts: lobes, advise and learn take it like a result.")
+    ] = None,
+    toolings: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder to write each tooling of a campaign to, under its own file name; made if it is not there.",
+            rich_help_panel="Cuts of new toolings",
+        ),
+    ] = None,
+    machine: Annotated[
+        Path | None,
+        typer.Option(
+            help="RESULT.json to write of the machine as these cuts teach it, too: it and the toolings belong together.",
+            rich_help_panel="Cuts of new toolings",
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files of these names.", rich_help_panel="Cuts of new toolings")
+    ] = False,
     method: Annotated[
         MethodName,
         typer.Option(help="Stability method of every draw's limits; later commands use the same one.", rich_help_panel="Speeds and method"),
@@ -54,13 +73,26 @@ def learn(
     processes: Processes = None,
     json_: Json = False,
 ) -> None:
-    """Learn from labelled cuts, stable or chatter, what modes, coefficients and limits they leave possible."""
+    """Learn from labelled cuts what modes and limits they leave possible, or from recorded ones what a tooling is that is new to a machine.
+
+    One stable, slow cut of a new tooling is enough; a tooling that its cuts contradict is named and not written, exit code 3.
+    """
+    from rcsa_ident.cli.learn_toolings import learn_from_campaign
     from rcsa_ident.io.learnt_tips import believed as told
     from rcsa_ident.io.learnt_tips import write_learnt_tip
     from rcsa_ident.io.tested_cuts import read_tested_cuts, unused_columns
     from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts
 
+    if toolings is not None:
+        if tests is not None or len(files) != 2:
+            found = "--tests, too" if tests is not None else f"{len(files)} files"
+            raise InputError("--toolings", found, "RESULT.json and the folder of a campaign, without --tests")
+        learn_from_campaign(files[0], files[1], toolings, machine, overwrite, processes, json_)
+        return
+    if tests is None or out is None:
+        missing = "--tests" if tests is None else "--out"
+        raise InputError(missing, "nothing", "--tests and --out for labelled cuts, or --toolings for a campaign of new toolings")
     writable(out)
     spec = cut_of(cut)
     cuts = read_tested_cuts(tests)

@@ -24,7 +24,7 @@ from rcsa_ident.identification.parameters import (
     scaled_joint,
     unpack,
 )
-from rcsa_ident.identification.priors import PriorRows, Priors, prior_rows
+from rcsa_ident.identification.priors import Known, Priors, prior_rows
 from rcsa_ident.identification.rough_toolings import ToolingAt
 
 #: Entries of a tool-holder that a line feels: the flange's tt, tr, rr, and flange over tip t, r.
@@ -90,7 +90,7 @@ class Misfit:
         # where little is told, forces are far from those that were simulated: they add up exactly
         exact = {c.term: k for k, c in enumerate(data.coefficients) if not c.tooling} if data.rough is not None else {}
         self._axes = tuple(
-            WeightedLines(a, data.relative_speed, f, self.cut_weight, exact) for a, f in zip(data.axes, model_error, strict=True)
+            WeightedLines(a, self.relative_speed, f, self.cut_weight, exact) for a, f in zip(data.axes, model_error, strict=True)
         )
         # lines of all axes, cut by cut: a cut's delay and angle are the same for both
         cut = np.concatenate([a.cut for a in self._axes])
@@ -153,7 +153,12 @@ class Misfit:
         """
         return self._residual(theta, layout, self.models(theta, layout), nuisance, self._cut_prior(theta, layout))
 
-    def prior(self, layout: Unknowns) -> PriorRows:
+    @property
+    def relative_speed(self) -> FloatArray:
+        """Spindle speed of each cut within those over which the machine changes, from -1 to 1, shape (k,) [-]."""
+        return self.data.relative_speed
+
+    def prior(self, layout: Unknowns) -> Known:
         """Return the priors of a layout's unknowns."""
         assert isinstance(layout, Layout)
         return prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -54,6 +55,24 @@ class Priors:
     standstill: tuple[float, float] = (0.01, 0.2)
     skew: float = 0.05
     tooth_angle: float = 10.0
+
+
+class Known(Protocol):
+    """What is known of a vector beforehand, as residuals of unit variance that change linearly with it."""
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Derivative of the residuals, shape (p, p)."""
+        ...
+
+    @property
+    def log_volume(self) -> float:
+        """log det of the information matrix."""
+        ...
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Return the residuals at a vector, shape (p,)."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -257,6 +257,13 @@ def read_campaign(folder: str | Path) -> Campaign:
     )
 
 
+def tooling_file_names(folder: str | Path) -> dict[str, str]:
+    """Return the file name of each tooling of a campaign's folder that `read_campaign` reads, by the campaign's key."""
+    path = Path(folder) / CAMPAIGN_FILE
+    paths = Table(read_toml(path, "campaign"), str(path)).table("toolings")
+    return {key: _inside(Path(folder), paths, key).name for key in paths.data}
+
+
 def campaign_of(
     data: Mapping[str, Any], where: str, name: str, tooling: Callable[[Table, str], Tooling], locate: Callable[[Table, str], Path]
 ) -> Campaign:

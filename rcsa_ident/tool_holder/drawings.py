@@ -16,6 +16,8 @@ from rcsa_ident.tool_holder.spread import Spread
 
 _STIFFNESSES = ("translational_stiffness", "rotational_stiffness")
 _DAMPINGS = ("translational_damping", "rotational_damping")
+#: Scatter of another clamping than the one that told of a contact: that one's is in what it told.
+_ANOTHER = float(np.sqrt(2.0))
 
 
 class Drawing(NamedTuple):
@@ -140,7 +142,7 @@ class FittedDrawing:
     deviation: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
-def rough_toolings(drawings: Mapping[str, Drawing]) -> RoughToolings | None:
+def rough_toolings(drawings: Mapping[str, Drawing], known: KnownToolings | None = None) -> RoughToolings | None:
     """Return what is unknown of several toolings, None where all are exact.
 
     Tools of one model share fluted part and modulus, holders of one model their contact and diameter. A contact differs a little
@@ -149,9 +151,19 @@ def rough_toolings(drawings: Mapping[str, Drawing]) -> RoughToolings | None:
     Parameters
     ----------
     drawings : mapping of tooling to Drawing
+        None of them told of `known`.
+    known : KnownToolings, optional
+        What others have told of the same models.
     """
     sharing = [d.holder_model for d in drawings.values() if d.holder_model]
-    members = [_unknowns_of(name, each, 1.0 if sharing.count(each.holder_model) > 1 else None) for name, each in drawings.items()]
+    told = set() if known is None else {unknown.owner for unknown in known.unknowns if unknown.kind == "holder"}
+
+    def reclamped(drawing: Drawing) -> float | None:
+        if drawing.holder_model in told:
+            return _ANOTHER
+        return 1.0 if sharing.count(drawing.holder_model) > 1 else None
+
+    members = [_unknowns_of(name, each, reclamped(each)) for name, each in drawings.items()]
     spreads: dict[RoughUnknown, float] = {}
     for own in members:
         for unknown, size in own.items():
@@ -183,7 +195,7 @@ def fitted(name: str, drawing: Drawing, known: KnownToolings | None = None) -> F
     of_holder = any((unknown.owner, unknown.kind) == (drawing.holder_model, "holder") for unknown in told)
     # another clamping than those that told of the contact: theirs is in what they told, its own comes on top
     elsewhere = known is not None and name not in known.toolings
-    wanted = _unknowns_of(name, drawing, np.sqrt(2.0) if of_holder and elsewhere else None)
+    wanted = _unknowns_of(name, drawing, _ANOTHER if of_holder and elsewhere else None)
     values = dict.fromkeys(ALTERATIONS, 0.0)
     first, own = [], []
     for unknown in dict.fromkeys((*wanted, *(each for each in told if (each.owner, each.kind) in owners))):

@@ -28,7 +28,7 @@ from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.sweep import measure_pass
 from rcsa_ident.signals.verdict import RecordCode, Verdict
-from rcsa_ident.tool_holder.drawings import rough_toolings
+from rcsa_ident.tool_holder.drawings import KnownToolings, rough_toolings
 from rcsa_ident.tool_holder.learned import learned
 from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
 from rcsa_ident.tool_holder.rough import rough_tool_holder
@@ -262,10 +262,12 @@ def _mode_deviation(
     return deviation(frequency), deviation(damping)
 
 
-def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = ()) -> IdentificationData:
+def data_of(
+    campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = (), known: KnownToolings | None = None
+) -> IdentificationData:
     """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them."""
     if not tests:
-        return with_rough(_data_of_cuts(campaign, readings), campaign)
+        return with_rough(_data_of_cuts(campaign, readings), campaign, known)
     at_points = {name: partial(receptance_at_points, t.assembly) for name, t in campaign.toolings.items()}
     usable = any(bool(each.measurements) for each in readings)
     return with_tests(_data_of_cuts(campaign, readings) if usable else None, tests, at_points)
@@ -285,10 +287,10 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     return replace(data, softening_spread=campaign.softening_spread)
 
 
-def with_rough(data: IdentificationData, campaign: Campaign) -> IdentificationData:
-    """Return the data whose tool-holders, depths and sensors are known as well as drawings and campaign say."""
+def with_rough(data: IdentificationData, campaign: Campaign, known: KnownToolings | None = None) -> IdentificationData:
+    """Return the data whose tool-holders, depths and sensors are known as well as drawings, earlier cuts and campaign say."""
     drawn = [campaign.toolings[name] for name in data.toolings]
-    rough = rough_toolings({t.name: t.drawing for t in drawn})
+    rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
     if rough is None:
         return data
     depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]

@@ -1,0 +1,111 @@
+"""One cut of a new tool: how well its tip is known before, after one slow cut, and after three.
+
+``python -m benchmarks learn``. Machines, drawings and truths are those of `benchmarks.rough`, whose results are made where they are not
+there; each tooling that never cut makes the slowest cut of its machine's plan, and then cuts at three of its speeds. Every finished row
+is a line of ``learn.jsonl`` in the scratch folder. *With the machine as it was* takes the learned tooling on the machine of the first
+campaign; *as these cuts teach it* on the machine that has learned beside the tooling (the option `--machine` of the command).
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.comparison import FREQUENCY, coverage, in_deviations, relative_error
+from benchmarks.machines import HELD_OUT
+from benchmarks.page import append_row, read_rows
+from benchmarks.rough import KINDS, identified
+from benchmarks.rough_machines import ROUGH, ROUGH_DEVELOPMENT, rough_campaign, truth_of
+from benchmarks.study import read_cut
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.io.curves import read_frf_csv
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.results import read_result
+from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.simulations import true_name
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.stability.tip_modes import TIP
+from rcsa_ident.workflows.identify import judge
+from rcsa_ident.workflows.learn_toolings import learn_toolings
+
+#: Which of a plan's speeds are cut, by their number.
+CUTS = {"one": (0,), "three": (0, 7, 17)}
+#: Columns of the table: what is predicted, and by which machine.
+STAGES = {
+    "before": "before",
+    "one": "one cut, machine as it was",
+    "one-taught": "one cut, machine as it teaches",
+    "three": "three, machine as it was",
+    "three-taught": "three, machine as they teach",
+}
+
+
+def compared(machine: IdentifiedMachine, tooling: Tooling, truth: Path) -> dict[str, Any]:
+    """Return errors [X, Y] of a tip and how often its 90 % band holds."""
+    omega = 2.0 * np.pi * FREQUENCY
+    true = read_frf_csv(truth / "tip" / true_name(tooling.name))
+    at = np.searchsorted(true.frequency, FREQUENCY - 1e-6)
+    tip = machine.tip(tooling, omega)
+    deviation, errors, z = tip.deviation(), [], []
+    for row in TIP:
+        found, here = tip.between(str(row), str(row)), true.values[row.dof.upper()][at]
+        errors.append(float(f"{relative_error(found, here):.4g}"))
+        z.append(in_deviations(found - here, deviation[row, row]))
+    return {"errors": errors, "band": round(coverage(np.concatenate(z))["90"], 3)}
+
+
+def learned(scratch: Path, seed: int, name: str) -> dict[str, Any]:
+    """Return a row: what is known of one tooling of a machine, stage by stage."""
+    path = scratch / "results" / f"rough-{seed}.json"
+    if not path.exists():
+        identified(scratch, seed, False)
+    machine = machine_from_json(read_result(path), str(path))
+    drawn, folder = rough_campaign(scratch, seed)
+    stages = {"before": compared(machine, drawn.toolings[name], truth_of(folder))}
+    notes = []
+    for label, speeds in CUTS.items():
+        _, cuts = rough_campaign(scratch, seed, (name,), f"learn-{name}-{label}", speeds)
+        campaign = read_campaign(cuts)
+        found = learn_toolings(machine, campaign, judge(campaign, partial(read_cut, campaign)))
+        tooling = found.toolings[0]
+        notes += [note for note in (tooling.contradiction, *found.notes) if note]
+        stages[label] = compared(machine, tooling.tooling, truth_of(folder))
+        stages[f"{label}-taught"] = compared(found.machine, tooling.tooling, truth_of(folder))
+    return {"machine": seed, "tooling": name, "stages": stages, "notes": notes}
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the table of all rows."""
+    lines = ["| tooling | known by | error: median | worst | 90 % band holds |", "|---|---|---|---|---|"]
+    for name in HELD_OUT:
+        for stage, words in STAGES.items():
+            own = [row["stages"][stage] for row in rows if row["tooling"] == name]
+            errors = np.array([each["errors"] for each in own])
+            held = 100.0 * np.mean([each["band"] for each in own])
+            lines.append(f"| {KINDS[name]} | {words} | {np.median(errors):.3f} | {errors.max():.3f} | {held:.0f} % |")
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Let machines learn toolings, by default those of development."""
+    parser = argparse.ArgumentParser(prog="benchmarks learn", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scratch", type=Path, help="folder of campaigns and results; default: a new temporary one")
+    known = f"seeds, as {ROUGH[0]} to {ROUGH[-1]} of the study; default: those of development"
+    parser.add_argument("--machines", nargs="+", type=int, default=list(ROUGH_DEVELOPMENT), help=known)
+    given = parser.parse_args(arguments)
+    scratch = given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-learn-"))
+    scratch.mkdir(parents=True, exist_ok=True)
+    path = scratch / "learn.jsonl"
+    done = {(row["machine"], row["tooling"]): row for row in read_rows(path)}
+    for key in ((seed, name) for seed in given.machines for name in HELD_OUT):
+        if key not in done:
+            done[key] = learned(scratch, *key)
+            append_row(path, done[key])
+        print(*key, {stage: (each["errors"], each["band"]) for stage, each in done[key]["stages"].items()}, *done[key]["notes"], flush=True)
+    print(f"\n{table([done[seed, name] for seed in given.machines for name in HELD_OUT])}")

@@ -1,0 +1,233 @@
+"""One cut of a new tool: what further cuts of a machine that is known tell of the toolings that they were made with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.further_fit import FurtherFit, fit_further
+from rcsa_ident.identification.known_machine import KnownMachine
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machining_setup import Campaign, Tooling
+from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered, fluted_segments
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.spread import SPREAD_FIELDS
+from rcsa_ident.units import to_rpm
+from rcsa_ident.workflows.identify import data_of
+
+#: Standard deviations by which something drawn may be off before a cut is said to contradict its drawing.
+SURPRISING = 4.0
+#: Share of a cut's lines that is left unexplained beyond which no tooling near its drawing has made it.
+UNEXPLAINED = 0.1
+#: Field of an alteration to that of a `Spread`, where they have not the same name.
+_SPREAD_OF = {
+    "fluted_length": "segment_length",
+    **{f"{way}_{what}": f"contact_{what}" for way in ("translational", "rotational") for what in ("stiffness", "damping")},
+}
+
+
+_LENGTHS = ("stickout", "fluted_length")
+_WORDS = {
+    "stickout": ("stickout", "mm"),
+    "fluted_length": ("fluted length", "mm"),
+    "fluted_diameter": ("fluted diameter", "mm"),
+    "youngs_modulus": ("Young's modulus of the tool", "GPa"),
+    "holder_diameter": ("holder diameter at its front", "mm"),
+}
+#: Per metre of insertion, as in the file.
+_CONTACT_UNITS = {
+    "translational_stiffness": "N/m per m",
+    "rotational_stiffness": "N m/rad per m",
+    "translational_damping": "N s/m per m",
+    "rotational_damping": "N m s/rad per m",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Learnt:
+    """A number of a drawing before and after cuts, with its standard deviations, in `unit`."""
+
+    what: str
+    unit: str
+    drawn: float
+    drawn_std: float
+    found: float
+    found_std: float
+
+
+@dataclass(frozen=True, slots=True)
+class LearntTooling:
+    """A tooling before and after its cuts.
+
+    Parameters
+    ----------
+    drawn : Tooling
+    tooling : Tooling
+        With the most probable values and what is left open of them. It belongs to no model any more: what is known of its model is in it.
+    by : Alteration
+        How it differs from its drawing.
+    deviation, before : Alteration
+        Standard deviations of that, after the cuts and before; 0 where the drawing is exact.
+    contradiction : str
+        What speaks against it; empty where nothing does.
+    """
+
+    drawn: Tooling
+    tooling: Tooling
+    by: Alteration
+    deviation: Alteration
+    before: Alteration
+    contradiction: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LearntToolings:
+    """What further cuts have told.
+
+    Parameters
+    ----------
+    toolings : tuple of LearntTooling
+    keys : tuple of str
+        The campaign's for each of them.
+    machine : IdentifiedMachine
+        As these cuts have taught it, too.
+    model_error : tuple of float [-]
+        Share of the lines of each axis that is left unexplained.
+    converged : bool
+    notes : tuple of str
+    """
+
+    toolings: tuple[LearntTooling, ...]
+    keys: tuple[str, ...]
+    machine: IdentifiedMachine
+    model_error: tuple[float, ...]
+    converged: bool
+    notes: tuple[str, ...] = ()
+
+
+def learn_toolings(machine: IdentifiedMachine, campaign: Campaign, readings: Sequence[Reading]) -> LearntToolings:
+    """Return what the usable cuts of a campaign tell of its toolings, on a machine that earlier cuts have told.
+
+    Parameters
+    ----------
+    machine : IdentifiedMachine
+        Its posterior is what is known of it before.
+    campaign : Campaign
+        Of toolings that are new to the machine; one stable cut of each is enough.
+    readings : sequence of Reading
+        As `rcsa_ident.workflows.identify.judge` returns them.
+
+    Raises
+    ------
+    InputError
+        If machine, toolings or cuts do not tell what is needed.
+    """
+    known = KnownMachine(machine.posteriors(), machine.toolings)
+    used = list(dict.fromkeys(each.tooling for each in readings if each.verdict.usable))
+    for name in used:
+        if campaign.toolings[name].spread.exact:
+            raise InputError("spread", f"{name}: a drawing that is exact", "a table [spread] in its file, empty for an honest drawing's")
+        if machine.toolings is not None and name in machine.toolings.toolings:
+            allowed = "a tooling that is new to the machine, under a name of its own; cuts of old ones go into a new identification"
+            raise InputError("toolings", f"{name}, which the machine was identified with", allowed)
+    if campaign.tests:
+        raise InputError("frfs", f"{len(campaign.tests)} hammer tests", "cuts alone")
+    data = data_of(campaign, readings, known=machine.toolings)
+    if not data.of_flange:
+        raise InputError("sensors", "accelerometers on the housing alone", "cuts whose displacement sensors see the flange")
+    if data.sweeps:
+        raise InputError("cuts", "passes whose speed changes", "cuts at a speed that is kept")
+    fit = fit_further(data, known, max(campaign.toolings[name].spread.spindle_joint for name in used))
+    notes = [*_speed_notes(known, data.spindle_speed.tolist())]
+    out = fit.contradicting()
+    if out:
+        notes.append(f"{', '.join(out)}: contradicts the other cuts and was left out")
+        keep = np.array([k for k, name in enumerate(data.cut_ids) if name not in out], dtype=np.intp)
+        fit = fit_further(data.of_cuts(keep), known, max(campaign.toolings[name].spread.spindle_joint for name in used))
+    toolings = tuple(_learnt(campaign.toolings[name], fit, k) for k, name in enumerate(data.toolings))
+    return LearntToolings(
+        toolings, data.toolings, _taught(machine, fit.machine(known)), fit.misfit.model_error, fit.solution.converged, tuple(notes)
+    )
+
+
+def _learnt(drawn: Tooling, fit: FurtherFit, place: int) -> LearntTooling:
+    rough = fit.data.rough
+    assert rough is not None
+    by = rough.alteration(place, fit.values)
+    weights = rough.weights[place] * rough.spread
+
+    def deviations(covariance: FloatArray) -> Alteration:
+        return Alteration(*np.sqrt(np.einsum("fu,uv,fv->f", weights, covariance, weights)).tolist())
+
+    after, before = deviations(fit.covariance), deviations(fit.before[1])
+    spread = {name: getattr(drawn.spread, name) for name in SPREAD_FIELDS}
+    for name in ("stickout", "fluted_diameter", "youngs_modulus", "holder_diameter"):
+        spread[name] = getattr(after, name)
+    for name in set(_SPREAD_OF.values()):
+        # the file has one number for translation and rotation: the larger one is honest
+        spread[name] = max(getattr(after, field) for field, of in _SPREAD_OF.items() if of == name)
+    assembly = altered(drawn.assembly, by)
+    tooling = replace(drawn, assembly=assembly, spread=type(drawn.spread)(**spread), tool_model="", holder_model="")
+    return LearntTooling(drawn, tooling, by, after, before, _contradiction(fit, place))
+
+
+def _contradiction(fit: FurtherFit, place: int) -> str:
+    """What speaks against what the cuts of a tooling have told of it."""
+    unexplained, moved = max(fit.misfit.model_error), fit.surprise(place)
+    if unexplained > UNEXPLAINED:
+        return f"no tooling near its drawing explains its cuts: {100.0 * unexplained:.0f} % of their lines are left over"
+    if moved > SURPRISING:
+        return f"its cuts ask for {moved:.1f} standard deviations of what its drawing leaves open: is it the tooling that cut?"
+    return ""
+
+
+def _speed_notes(known: KnownMachine, speeds: list[float]) -> list[str]:
+    middle, half = known.speed_range
+    beyond = [speed for speed in speeds if half and abs(speed - middle) > 1.02 * half]
+    if not beyond:
+        return []
+    low, high = to_rpm(middle - half), to_rpm(middle + half)
+    return [f"{to_rpm(beyond[0]):.0f} rev/min lies outside the speeds that the machine was identified at, {low:.0f} to {high:.0f} rev/min"]
+
+
+def _taught(machine: IdentifiedMachine, known: KnownMachine) -> IdentifiedMachine:
+    """The machine with another posterior; what single ranges of speed said for themselves is not in it."""
+    axes = {}
+    for axis, posterior in known.posteriors.items():
+        modes, joint = posterior.machine(axis)
+        axes[axis] = MachineAxis(Spindle(modes), joint, posterior)
+    return replace(machine, identified=axes, toolings=known.toolings, speed_models=(), kept_sides=())
+
+
+def told(learnt: LearntTooling) -> list[Learnt]:
+    """Return what was learned of each number that a drawing leaves open, in the drawing's terms and units."""
+    return [_row(learnt, field) for field in ALTERATIONS if getattr(learnt.before, field) > 0.0]
+
+
+def _row(learnt: LearntTooling, field: str) -> Learnt:
+    drawn, found = learnt.drawn.assembly, learnt.tooling.assembly
+    flutes = fluted_segments(drawn.tool)
+
+    def value(assembly: ToolAssembly) -> float:
+        sizes = {
+            "stickout": 1e3 * assembly.stickout,
+            "fluted_length": 1e3 * sum(segment.length for segment in assembly.tool[:flutes]),
+            "fluted_diameter": 1e3 * assembly.tool[max(flutes - 1, 0)].diameter,
+            "youngs_modulus": 1e-9 * assembly.tool[-1].material.youngs_modulus,
+            "holder_diameter": 1e3 * assembly.holder[0].diameter,
+        }
+        return sizes[field] if field in sizes else float(getattr(assembly.contact, field))
+
+    what, unit = _WORDS.get(field, (f"{field.replace('_', ' ')} of the contact", _CONTACT_UNITS.get(field, "")))
+    before, after, was, is_ = getattr(learnt.before, field), getattr(learnt.deviation, field), value(drawn), value(found)
+    # lengths have a deviation in metres, all else one of its logarithm
+    return Learnt(
+        what, unit, was, 1e3 * before if field in _LENGTHS else was * before, is_, 1e3 * after if field in _LENGTHS else is_ * after
+    )
