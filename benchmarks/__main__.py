@@ -37,6 +37,7 @@ STUDIES = (
     "rough",
     "labelled_cuts",
     "learn",
+    "ring",
 )
 
 

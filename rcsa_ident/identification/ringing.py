@@ -413,7 +413,8 @@ def _after_ring(tooling: Tooling, mean: FloatArray, prior: FloatArray, covarianc
             values[group] = float(np.sqrt(np.mean([std[name] ** 2 for name in names])))
     heard_contact = any(prior[UNKNOWNS.index(name)] > 0.0 for name in ("translational_stiffness", "translational_damping"))
     values["reclamping"] = 0.0 if heard_contact else spread.reclamping
-    return replace(tooling, assembly=assembly, tool_behind=rear, spread=replace(spread, **values))
+    # its models are as drawn: what cuts have told of them would be added to what the ring has told
+    return replace(tooling, assembly=assembly, tool_behind=rear, spread=replace(spread, **values), tool_model="", holder_model="")
 
 
 def _rear(tool: Sequence[BeamSegment], length: float) -> list[BeamSegment]:

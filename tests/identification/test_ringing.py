@@ -34,7 +34,7 @@ TRUE = Alteration(
 
 
 def drawn(teeth=4, **spread):
-    return Tooling("T", Cutter(teeth, 0.012, 0.5), slender(), Spread(**spread), taper="HSK-A63")
+    return Tooling("T", Cutter(teeth, 0.012, 0.5), slender(), Spread(**spread), "EM12", "ER32", taper="HSK-A63")
 
 
 def ring(body, count=2, error=0.0, moved=1.0):
@@ -68,6 +68,8 @@ def test_what_a_drawing_does_not_tell_is_found():
     before, after = found.before.spread, found.after.spread
     assert after.fluted_diameter < 0.3 * before.fluted_diameter
     assert (after.reclamping, after.spindle_joint) == (0.0, before.spindle_joint)
+    # what cuts told of its models is not added to what the ring has told
+    assert (found.before.tool_model, found.after.tool_model, found.after.holder_model) == ("EM12", "", "")
 
 
 def test_damping_alone_tells_the_contact_s_damping():
