@@ -40,7 +40,8 @@ _STEP = 1e-5
 #: Cuts from which on speeds beside the programmed ones say something, and by what share they lie beside them at least.
 _FEW_SPEEDS, _LEAST_CLOCK_ERROR = 5, 2e-4
 DRAWINGS_EXACT = (
-    "toolings were taken as drawn, whatever their [spread] says: beside hammer tests and by the published method nothing of them is learned"
+    "toolings were taken as drawn, whatever their [spread] says: of passes, beside hammer tests and by the published method nothing of them "
+    "is learned"
 )
 #: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
@@ -291,7 +292,8 @@ def with_rough(data: IdentificationData, campaign: Campaign, known: KnownTooling
     """Return the data whose tool-holders, depths and sensors are known as well as drawings, earlier cuts and campaign say."""
     drawn = [campaign.toolings[name] for name in data.toolings]
     rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
-    if rough is None:
+    # what a sweep does to a line is taken out by the drawn tool-holder's receptances around it
+    if rough is None or data.sweeps:
         return data
     depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]
     shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
