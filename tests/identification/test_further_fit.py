@@ -53,7 +53,7 @@ def of_one_cut(shop, clamped, speed=8000.0 * np.pi / 30.0):
     own = replace(shop, toolings={name: drawn}, truth={name: [(order, order * speed, np.einsum("noii->nio", both))]})
     cuts, _ = own.measurements(np.random.default_rng(SEED + 1), fixture=False)
     rough = rough_toolings({name: Drawing(drawn.assembly, Spread())})
-    return own.prepare(cuts).with_rough_toolings(rough, [rough_tool_holder(drawn.assembly, HIGHEST)])
+    return with_rough_toolings(own.prepare(cuts), rough, [rough_tool_holder(drawn.assembly, HIGHEST)])
 
 
 def error(machine, assembly, shop, clamped):
