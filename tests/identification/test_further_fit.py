@@ -9,6 +9,7 @@ import scipy.linalg
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.further_fit import fit_further
 from rcsa_ident.identification.known_machine import KnownMachine
+from rcsa_ident.identification.rough_data import with_rough_toolings
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings
