@@ -40,8 +40,8 @@ _STEP = 1e-5
 #: Cuts from which on speeds beside the programmed ones say something, and by what share they lie beside them at least.
 _FEW_SPEEDS, _LEAST_CLOCK_ERROR = 5, 2e-4
 DRAWINGS_EXACT = (
-    "toolings were taken as drawn, whatever their [spread] says: of passes, beside hammer tests and by the published method nothing of them "
-    "is learned"
+    "toolings were taken as drawn, whatever their [spread] says: of passes, beside hammer tests and by the published method nothing of "
+    "them is learned"
 )
 #: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
