@@ -4,7 +4,8 @@ Seeds of the machines, `ROUGH` and `ROUGH_DEVELOPMENT`, and the distributions he
 took anything of a tooling for unknown. A machine, its drawn toolings and its plan are those of `benchmarks.machines` for the same seed;
 what is true differs from them by chances of its own:
 
-* tool and holder by the spreads that a tooling file takes by default, those of one model alike in all clampings,
+* tool and holder by the spreads that a tooling file takes by default, but for the contact's damping, which is half as wide; those of one
+  model are alike in all clampings,
 * the contact and the flange's joint by a little more in each clamping,
 * K_tc by 2 %, the radial ratio by 9 %, edge forces of up to some 10 N/mm that nobody tells,
 * gap sensors by 2 % of gain and 1.5 % of cross-talk,
