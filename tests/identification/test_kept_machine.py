@@ -103,12 +103,18 @@ def test_limits_to_rounding_and_those_of_drawn_machines_closely(kept, name):
     assert ours.warnings == theirs.warnings
     rng, drawn = np.random.default_rng(1), np.zeros((60, OMEGA.size, 2, 2), dtype=complex)
     for draw in drawn:
+        own = [rng.standard_normal(len(spreads[axis])) for axis in (Dof.X, Dof.Y)]
+        own[1][-1] = own[0][-1]  # the holder is one and the same in both planes
         for i, axis in enumerate((Dof.X, Dof.Y)):
-            draw[:, i, i] = tips[axis] + rng.standard_normal(len(spreads[axis])) @ spreads[axis]
+            draw[:, i, i] = tips[axis] + own[i] @ spreads[axis]
     limits = ZeroOrder().depths(OMEGA, drawn, process(tooling), SPEEDS, 0.02)
     both = np.isfinite(ours.drawn) & np.isfinite(limits)
     assert both.mean() > 0.9
-    np.testing.assert_allclose(ours.drawn[both], limits[both], rtol=1e-4)
+    # at the very end of a lobe the limit jumps; there it may be that of a speed one in two thousand away
+    away = [ZeroOrder().depths(OMEGA, drawn, process(tooling), factor * SPEEDS, 0.02) for factor in (0.9995, 1.0005)]
+    off = np.abs(ours.drawn / np.array([limits, *away]) - 1.0)
+    assert np.mean(off[0][both] < 1e-4) > 0.999
+    assert np.all(off.min(axis=0)[both] < 1e-3)
     everywhere = np.quantile(np.where(limits > 0.02, np.inf, limits), (0.025, 0.975), axis=0, method="nearest")
     for here, there in zip(ours.band, everywhere, strict=True):
         known = np.isfinite(here) & np.isfinite(there)

@@ -1,5 +1,5 @@
 // What the charts of a recording show: its signal, its spectrum over orders, its spectrogram with the tooth orders.
-import { axis, colour } from "./charts.js";
+import { axis, colour, decades } from "./charts.js";
 import { plain } from "./units.js";
 
 /** Multiples that are drawn at most, and orders that are shown at first. */
@@ -60,7 +60,7 @@ export function orderFigure(found) {
     layout: {
       shapes,
       xaxis: axis(spindle === null ? "Frequency [Hz]" : `Order of the spindle, ${plain(spindle, 2, 2)} Hz`, { showgrid: false, range: [0, spindle === null ? last : Math.min(last, Math.max(ORDERS, (1.15 * (found.chatter_frequencies_hz[0] ?? 0)) / spindle))] }),
-      yaxis: axis(`Amplitude [${unit}]`, { type: "log", exponentformat: "power", dtick: 1, range: top > 0 ? [Math.log10(top) - 4, Math.log10(top) + 0.2] : undefined }),
+      yaxis: decades(`Amplitude [${unit}]`, { range: top > 0 ? [Math.log10(top) - 4, Math.log10(top) + 0.2] : undefined }),
     },
   };
 }

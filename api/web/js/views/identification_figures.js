@@ -1,5 +1,5 @@
 // What the charts of a running identification show.
-import { axis, colour, safe } from "../charts.js";
+import { axis, colour, decades, safe } from "../charts.js";
 import { factor, unit } from "../units.js";
 
 const INKS = { X: "s1", Y: "s2", both: "s3" };
@@ -75,7 +75,7 @@ export function costFigure(trace, width) {
       annotations: placed(labels, width, longest),
       margin: { l: 56, r: 14, t: ROWS * ROW + 8, b: 44 },
       xaxis: axis("Time [s]", { rangemode: "tozero" }),
-      yaxis: axis("Misfit", { type: "log", exponentformat: "power", dtick: 1 }),
+      yaxis: decades("Misfit"),
     },
     say: `Misfit over time: ${[...trace].map(([name, points]) => `${name}, ${points.at(-1)?.stage}, ${points.at(-1)?.cost.toPrecision(3)}`).join("; ")}.`,
   };

@@ -1,7 +1,7 @@
 // One recording: its signal, its spectrum with the harmonics marked, and what was found in it.
 import { get, getBlob, part } from "../api.js";
 import { add, card, choices, fill, h, head, link, note, save } from "../dom.js";
-import { axis, chart, colour, legend, safe, SERIES } from "../charts.js";
+import { axis, chart, colour, decades, legend, safe, SERIES } from "../charts.js";
 import { failed } from "../forms.js";
 import { go, to } from "../router.js";
 import { factor, plain, unit } from "../units.js";
@@ -163,13 +163,7 @@ function spectrumFigure({ frequency_hz: x, channels, harmonics_hz: harmonics }, 
     }),
   };
   const data = panels(channels, names).flatMap((panel, k, all) => {
-    layout[panel.layoutKey] = axis(`[${panel.title}]`, {
-      domain: panel.domain,
-      type: "log",
-      exponentformat: "power",
-      dtick: 1,
-      nticks: 5,
-    });
+    layout[panel.layoutKey] = decades(`[${panel.title}]`, { domain: panel.domain });
     if (k === all.length - 1) layout.xaxis.anchor = panel.yaxis;
     return panel.names.map((name) => ({
       x,
