@@ -140,7 +140,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
 
 
 def warm() -> None:
-    """Judge a small record: imports and compiles everything a verdict needs."""
+    """Judge small records, of a speed that keeps and of one that wanders: imports and compiles everything a verdict needs."""
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
     from rcsa_ident.cutting.cutter import Cutter
@@ -148,10 +148,11 @@ def warm() -> None:
     from rcsa_ident.signals.recording import Quantity
 
     rate, speed, rng = 20000.0, 200.0 * np.pi, np.random.default_rng(1)
-    time = np.arange(4000) / rate
-    wave = 1e-6 * np.sum([np.cos(m * speed * time) for m in range(1, 9)], axis=0)
+    time = np.arange(20000) / rate
     both = (Sensor("x", Quantity.DISPLACEMENT, Dof.X), Sensor("y", Quantity.DISPLACEMENT, Dof.Y))
     conditions = CuttingConditions(speed, 1e-4, 1e-4, Engagement.from_immersion(0.5, "down"))
-    for sensors in (both[:1], both):
+    for sensors, wander in ((both[:1], 0.0), (both, 0.0), (both, 5.0)):
+        angle = speed * time + wander * np.sin(4.0 * np.pi * time)
+        wave = 1e-6 * np.sum([np.cos(m * angle) for m in range(1, 9)], axis=0)
         made = Recording(rate, wave[:, None] + 1e-9 * rng.standard_normal((wave.size, len(sensors))), sensors)
         measure_cut("warm", "warm", made, made, Cutter(2, 0.012), conditions, CuttingCoefficients(9e8, 0.3))

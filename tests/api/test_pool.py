@@ -198,7 +198,9 @@ def test_previews_of_one_query_are_shared_by_the_processes():
         return await asyncio.gather(*(pool.run(of_a_preview, Preview()) for _ in range(12)))
 
     try:
-        # the first ones are asked while the processes begin
+        # the first ones are asked while the processes begin, which may leave one alone for a while
+        asyncio.run(asked())
+        until(lambda: sum(member.ready for member in pool.members) >= 2)
         for _ in range(2):
             counts = Counter(asyncio.run(asked()))
     finally:

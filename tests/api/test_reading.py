@@ -390,3 +390,40 @@ def test_a_tone_stands_at_its_place_with_its_amplitude(tmp_path, count):
         assert found["frequency_hz"][strongest] == pytest.approx(1600.0, abs=60.0)
     assert found["harmonics_hz"][:2] == [100.0, 200.0]
     assert max(found["harmonics_hz"]) <= 25600.0
+
+
+KNOWN_KERNELS = """
+import sys
+import numpy as np
+from numba.core.registry import CPUDispatcher
+from api.reading import examine
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.signals.measurement import measure_cut
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+
+def kernels():
+    rooms = [vars(module) for name, module in list(sys.modules.items()) if name.startswith("rcsa_ident.")]
+    return {(each.__module__, name): list(each.signatures) for room in rooms for name, each in room.items() if isinstance(each, CPUDispatcher)}
+
+examine.warm()
+known, rng = kernels(), np.random.default_rng(1)
+both = (Sensor("x", Quantity.DISPLACEMENT, Dof.X), Sensor("y", Quantity.DISPLACEMENT, Dof.Y))
+conditions = CuttingConditions(200.0 * np.pi, 1e-4, 1e-4, Engagement.from_immersion(0.5, "down"))
+angle = 200.0 * np.pi * np.arange(60000) / 20000.0
+for wander in (0.0, 0.02):
+    wave = np.cos(np.outer(angle * (1.0 + wander * np.arange(60000) / 60000), np.arange(1, 9))).sum(axis=1, keepdims=True)
+    found = Recording(20000.0, 1e-6 * wave + 1e-6 * rng.standard_normal((60000, 2)), both)
+    measure_cut("c", "t", found, found, Cutter(2, 0.012), conditions, CuttingCoefficients(9e8, 0.3))
+assert len(known) > 5
+late = {key: each for key, each in kernels().items() if each != known.get(key, [])}
+assert not late, late
+"""
+
+
+@pytest.mark.slow(seconds=8)
+def test_no_kernel_is_compiled_within_the_limits_of_a_call():
+    """A compiler needs more memory than a call has: on a new installation the first record that wanders would be one that cannot be read."""
+    subprocess.run([sys.executable, "-c", KNOWN_KERNELS], check=True, timeout=PATIENCE)
