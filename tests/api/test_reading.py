@@ -406,7 +406,8 @@ from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
 def kernels():
     rooms = [vars(module) for name, module in list(sys.modules.items()) if name.startswith("rcsa_ident.")]
-    return {(each.__module__, name): list(each.signatures) for room in rooms for name, each in room.items() if isinstance(each, CPUDispatcher)}
+    found = [(name, each) for room in rooms for name, each in room.items() if isinstance(each, CPUDispatcher)]
+    return {(each.__module__, name): list(each.signatures) for name, each in found}
 
 examine.warm()
 known, rng = kernels(), np.random.default_rng(1)
@@ -425,5 +426,5 @@ assert not late, late
 
 @pytest.mark.slow(seconds=8)
 def test_no_kernel_is_compiled_within_the_limits_of_a_call():
-    """A compiler needs more memory than a call has: on a new installation the first record that wanders would be one that cannot be read."""
+    """A compiler needs more memory than a call has: on a new installation no record that wanders could be read."""
     subprocess.run([sys.executable, "-c", KNOWN_KERNELS], check=True, timeout=PATIENCE)
