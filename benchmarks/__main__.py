@@ -35,6 +35,7 @@ STUDIES = (
     "real_machine",
     "hammer",
     "rough",
+    "rough_recommendation",
     "labelled_cuts",
     "learn",
     "ring",

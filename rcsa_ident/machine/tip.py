@@ -292,12 +292,16 @@ class TipSpread:
         ahead, behind = ([holder_of(each, omega, self.sides, self.turning) for each in row] for row in zip(*self.drawing.ends, strict=True))
         return list(zip(ahead, behind, strict=True))
 
+    @cached_property
+    def _stiffer(self) -> Holder | None:
+        """The tool-holder a standard deviation stiffer."""
+        if self.stiffness_spread <= 0.0:
+            return None
+        return holder_of(stiffened(self.drawing.assembly, self.stiffness_spread), self.sides[0].omega, self.sides, self.turning)
+
     def at(self, places: Places) -> tuple[Variation, ...]:
         """Return the variations at some of the frequencies."""
-        holder, omega = self.holder.at(places), self.sides[0].omega[places]
-        stiffer = None
-        if self.stiffness_spread > 0.0:
-            stiffer = holder_of(stiffened(self.drawing.assembly, self.stiffness_spread), omega, self.sides, self.turning)
+        holder, stiffer = self.holder.at(places), None if self._stiffer is None else self._stiffer.at(places)
         found = []
         for side, members in self._known:
             here = holder.tip(side.nominal[places])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -209,6 +210,7 @@ def tool_holder_receptance(
     return tool_holder_poles(assembly, float(omega.max()), axis, shear_coefficient).receptance(omega)
 
 
+@lru_cache(maxsize=64)
 def tool_holder_poles(assembly: ToolAssembly, highest: float, axis: Dof = Dof.X, shear_coefficient: ShearCoefficient = cowper) -> PoleModel:
     """Return the poles behind those receptances: translation and slope of the tip, then of the flange.
 
@@ -221,6 +223,10 @@ def tool_holder_poles(assembly: ToolAssembly, highest: float, axis: Dof = Dof.X,
         The bending plane.
     shear_coefficient : callable
         As in `tool_holder_structure`.
+
+    Notes
+    -----
+    The last ones are kept: a machine that changes with speed asks for the same tool-holder at every speed.
     """
     return poles(tool_holder_structure(assembly, highest / (2.0 * np.pi), axis, shear_coefficient), highest)
 
