@@ -147,10 +147,12 @@ class Holder:
     ----------
     assembly : ToolAssembly
     omega : array, shape (n,) [rad/s]
+    highest : float or None [rad/s]
+        Frequency up to which mesh and modes are good; that of `omega` by default.
     """
 
-    def __init__(self, assembly: ToolAssembly, omega: FloatArray) -> None:
-        free = tool_holder_poles(assembly, float(omega[-1])).entries(omega, _ENTRIES)
+    def __init__(self, assembly: ToolAssembly, omega: FloatArray, highest: float | None = None) -> None:
+        free = tool_holder_poles(assembly, float(omega[-1]) if highest is None else highest).entries(omega, _ENTRIES)
         to, back = free[1:3], free[3:5]
         self.free = free
         self.tip_tip, self.flange = free[0].copy(), np.stack([free[5], 0.5 * (free[6] + free[7]), free[8]])
@@ -292,16 +294,14 @@ class TipSpread:
         ahead, behind = ([holder_of(each, omega, self.sides, self.turning) for each in row] for row in zip(*self.drawing.ends, strict=True))
         return list(zip(ahead, behind, strict=True))
 
-    @cached_property
-    def _stiffer(self) -> Holder | None:
-        """The tool-holder a standard deviation stiffer."""
-        if self.stiffness_spread <= 0.0:
-            return None
-        return holder_of(stiffened(self.drawing.assembly, self.stiffness_spread), self.sides[0].omega, self.sides, self.turning)
-
     def at(self, places: Places) -> tuple[Variation, ...]:
         """Return the variations at some of the frequencies."""
-        holder, stiffer = self.holder.at(places), None if self._stiffer is None else self._stiffer.at(places)
+        holder, omega = self.holder.at(places), self.sides[0].omega
+        stiffer = None
+        if self.stiffness_spread > 0.0:
+            # with the mesh and the modes of all frequencies, as the tool-holder itself
+            assembly, highest = stiffened(self.drawing.assembly, self.stiffness_spread), float(omega[-1])
+            stiffer = holder_of(assembly, omega[places], self.sides, self.turning, highest)
         found = []
         for side, members in self._known:
             here = holder.tip(side.nominal[places])
@@ -347,9 +347,11 @@ class TipSpread:
         return np.concatenate([np.zeros((0, self.sides[0].omega.size), dtype=complex), *curves])
 
 
-def holder_of(assembly: ToolAssembly, omega: FloatArray, sides: Sequence[Side], turning: float | None) -> Holder:
+def holder_of(
+    assembly: ToolAssembly, omega: FloatArray, sides: Sequence[Side], turning: float | None, highest: float | None = None
+) -> Holder:
     """Return a tool-holder at some frequencies as the machine's parts need it, turning or not."""
-    return Holder(assembly, omega) if turning is None else TurningHolder(assembly, omega, turning, sides[0].axes)
+    return Holder(assembly, omega, highest) if turning is None else TurningHolder(assembly, omega, turning, sides[0].axes)
 
 
 def tip_over_sides(
