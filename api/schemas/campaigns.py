@@ -49,6 +49,10 @@ class HeadKeys(Body):
     clock_error_percent: float | None = Field(
         None, ge=-2.0, le=2.0, description="By how much the recorder's clock runs fast: it takes that many more samples in a second."
     )
+    axial_depth_spread_mm: float | None = Field(None, description="Standard deviation of the depth, common to a tooling's cuts; 0.02.")
+    speed_softening_percent: float | None = Field(
+        None, description="Standard deviation of the stiffness's change from the middle of the speeds to their end."
+    )
 
 
 class SensorKeys(Body):
@@ -68,6 +72,9 @@ class SensorKeys(Body):
     )
     pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
     tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
+    gain_spread_percent: float | None = Field(None, description="Standard deviations that count where drawings are rough: of the gain, 2,")
+    cross_talk_percent: float | None = Field(None, description="of what the sensor feels of the other axis, 1.5,")
+    delay_spread_us: float | None = Field(None, description="and of its delay, 5.")
 
     def sensor(self, name: str) -> Sensor:
         """Return the sensor of a channel."""
@@ -104,6 +111,7 @@ class WorkpieceKeys(Body):
     tangential_coefficient_spread_percent: float | None = None
     radial_ratio_spread_percent: float | None = None
     edge_spread_percent: float | None = None
+    edge_force_spread_n_per_mm: float | None = Field(None, description="Standard deviation of edge forces that nobody tells; 10.")
 
 
 class CutKeys(Body):

@@ -57,6 +57,7 @@ class ToolKeys(Body):
 
     stickout_mm: float
     segments: list[SegmentKeys] = Field(min_length=1, max_length=MOST_SEGMENTS)
+    model: Text | None = Field(None, description="Tools of one model share what their drawing does not tell.")
 
 
 class HolderKeys(Body):
@@ -64,6 +65,8 @@ class HolderKeys(Body):
 
     insertion_mm: float
     segments: list[SegmentKeys] = Field(min_length=1, max_length=MOST_SEGMENTS)
+    model: Text | None = Field(None, description="Holders of one model share their contact.")
+    taper: Text | None = Field(None, description="What a ring hears behind the flange, as HSK-A63.")
 
 
 class ContactKeys(Body):
@@ -84,6 +87,20 @@ class MaterialKeys(Body):
     loss_factor: float | None = None
 
 
+class SpreadKeys(Body):
+    """[spread]: how well the drawing is known, standard deviations; 0 is exactly, and what is left out is as well as drawings are."""
+
+    stickout_mm: float | None = None
+    fluted_diameter_percent: float | None = None
+    youngs_modulus_percent: float | None = None
+    contact_stiffness_percent: float | None = None
+    contact_damping_percent: float | None = None
+    holder_diameter_percent: float | None = None
+    reclamping_percent: float | None = None
+    spindle_joint_percent: float | None = None
+    segment_length_mm: float | None = None
+
+
 class ToolingKeys(Body):
     """A tooling, with the keys of a tooling file."""
 
@@ -95,6 +112,7 @@ class ToolingKeys(Body):
     holder: HolderKeys
     contact: ContactKeys | None = None
     materials: dict[Text, MaterialKeys] | None = Field(None, max_length=50)
+    spread: SpreadKeys | None = Field(None, description="Without it the drawing is taken as exact.")
 
 
 class ToolingAnswer(Answer):

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from api.schemas.campaigns import NewCampaign
 from api.schemas.machines import Modes
 from api.schemas.queries import Band, ToolingAdvice, ToolingLobes
+from api.schemas.toolings import ToolingKeys
 from api.work.tasks import modes
 from rcsa_ident.dynamics.uncertain import Doubted
 from rcsa_ident.io.drawings import known_toolings_to_json
@@ -21,6 +23,30 @@ def test_schemas_are_those_of_the_command(shop):
     for name in SCHEMAS:
         assert client.schema(name) == schema_of(name)
     assert "tooling, campaign, machine, modes" in refused(404, client.schema, "result").detail
+
+
+def keys(schema, place="", definitions=None):
+    """Names of everything that a schema knows, with the tables around them."""
+    definitions = schema.get("$defs", schema.get("definitions", {})) if definitions is None else definitions
+    if "$ref" in schema:
+        return keys(definitions[schema["$ref"].rpartition("/")[2]], place, definitions)
+    found = set()
+    for name, inner in schema.get("properties", {}).items():
+        found |= {f"{place}{name}"} | keys(inner, f"{place}{name}.", definitions)
+    for inner in [*schema.get("anyOf", []), *([schema["items"]] if "items" in schema else [])]:
+        found |= keys(inner, place, definitions)
+    if isinstance(schema.get("additionalProperties"), dict):
+        found |= keys(schema["additionalProperties"], f"{place}*.", definitions)
+    return found
+
+
+def test_bodies_have_the_keys_of_the_files():
+    """Else a file that a command reads could not be sent, or its tooling not be shown."""
+    assert keys(ToolingKeys.model_json_schema()) == keys(schema_of("tooling"))
+    of_file, of_body = keys(schema_of("campaign")), keys(NewCampaign.model_json_schema())
+    assert "sensors.*.gain_spread_percent" in of_file
+    # a file names its toolings' files; a body may hold the toolings
+    assert {each for each in of_body if not each.startswith("toolings.")} == of_file - {"toolings.*"}
 
 
 def test_modes_tell_what_was_learned_of_toolings(tmp_path):

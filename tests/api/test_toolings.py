@@ -149,3 +149,17 @@ def test_an_unknown_shape_is_refused_with_the_known_ones(client):
     problem = refused(422, client.write_tooling, "S1", example(cutter={"teeth": 4, "diameter_mm": 12.0, "shape": "round"}))
     assert problem.errors[0].field == "cutter.shape"
     assert all(shape in problem.errors[0].allowed for shape in CutterShape)
+
+
+def test_what_a_drawing_does_not_tell_goes_in_and_comes_out(client):
+    rough = example() | {"spread": {"stickout_mm": 0.3, "contact_damping_percent": 0.0}}
+    rough["tool"] |= {"model": "EM12-4"}
+    rough["holder"] |= {"model": "PG25", "taper": "HSK-A63"}
+    made = client.write_tooling("T1", rough)
+    assert client.write_tooling("T2", client.tooling_file("T1")).tooling == made.tooling
+    read = tooling_of(client.tooling_file("T1"))
+    assert (read.spread.stickout, read.spread.contact_damping, read.tool_model, read.holder_model) == (0.3e-3, 0.0, "EM12-4", "PG25")
+    assert read.spread.youngs_modulus == 0.02
+    assert client.tooling("T2").tooling.holder.taper == "HSK-A63"
+    problem = refused(422, client.write_tooling, "T3", rough | {"spread": {"stickot_mm": 1.0}})
+    assert problem.errors[0].field == "spread.stickot_mm"
