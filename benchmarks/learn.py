@@ -1,9 +1,9 @@
 """One cut of a new tool: how well its tip is known before, after one slow cut, and after three.
 
 ``python -m benchmarks learn``. Machines, drawings and truths are those of `benchmarks.rough`, whose results are made where they are not
-there; each tooling that never cut makes the slowest cut of its machine's plan, and then cuts at three of its speeds. Every finished row
-is a line of ``learn.jsonl`` in the scratch folder. *With the machine as it was* takes the learned tooling on the machine of the first
-campaign; *as these cuts teach it* on the machine that has learned beside the tooling (the option `--machine` of the command).
+there; each tooling that never cut makes the slowest stable cut of its machine's plan, and then cuts at three of its speeds. Every
+finished row is a line of ``learn.jsonl`` in the scratch folder. *With the machine as it was* takes the learned tooling on the machine of
+the first campaign; *as these cuts teach it* on the machine that has learned beside the tooling (the option `--machine` of the command).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.comparison import FREQUENCY, coverage, in_deviations, relative_error
 from benchmarks.machines import HELD_OUT
-from benchmarks.page import append_row, read_rows
+from benchmarks.page import DOCS, append_row, read_rows, write_block, write_rows
 from benchmarks.rough import KINDS, identified
 from benchmarks.rough_machines import ROUGH, ROUGH_DEVELOPMENT, rough_campaign, truth_of
 from benchmarks.study import read_cut
@@ -29,12 +29,14 @@ from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.io.simulations import true_name
-from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.machining_setup import Campaign, Tooling
+from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.workflows.identify import judge
 from rcsa_ident.workflows.learn_toolings import learn_toolings
 
-#: Which of a plan's speeds are cut, by their number.
+#: Speeds of a plan, and which of them are cut, by their number.
+COUNT = 40
 CUTS = {"one": (0,), "three": (0, 7, 17)}
 #: Columns of the table: what is predicted, and by which machine.
 STAGES = {
@@ -70,14 +72,25 @@ def learned(scratch: Path, seed: int, name: str) -> dict[str, Any]:
     stages = {"before": compared(machine, drawn.toolings[name], truth_of(folder))}
     notes = []
     for label, speeds in CUTS.items():
-        _, cuts = rough_campaign(scratch, seed, (name,), f"learn-{name}-{label}", speeds)
-        campaign = read_campaign(cuts)
-        found = learn_toolings(machine, campaign, judge(campaign, partial(read_cut, campaign)))
+        campaign, readings = _stable_cuts(scratch, seed, name, label, speeds)
+        found = learn_toolings(machine, campaign, readings)
         tooling = found.toolings[0]
         notes += [note for note in (tooling.contradiction, *found.notes) if note]
         stages[label] = compared(machine, tooling.tooling, truth_of(folder))
         stages[f"{label}-taught"] = compared(found.machine, tooling.tooling, truth_of(folder))
     return {"machine": seed, "tooling": name, "stages": stages, "notes": notes}
+
+
+def _stable_cuts(scratch: Path, seed: int, name: str, label: str, speeds: tuple[int, ...]) -> tuple[Campaign, list[Reading]]:
+    """Return a campaign and what its cuts show; where all of them chatter, as on a shop floor the next speeds are cut."""
+    for further in range(COUNT - speeds[-1]):
+        own = f"learn-{name}-{label}" + (f"-{further}" if further else "")
+        _, folder = rough_campaign(scratch, seed, (name,), own, tuple(speed + further for speed in speeds))
+        campaign = read_campaign(folder)
+        readings = judge(campaign, partial(read_cut, campaign))
+        if any(reading.verdict.usable for reading in readings):
+            return campaign, readings
+    raise RuntimeError(f"machine {seed}, {name}: no stable cut")
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
@@ -98,6 +111,7 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--scratch", type=Path, help="folder of campaigns and results; default: a new temporary one")
     known = f"seeds, as {ROUGH[0]} to {ROUGH[-1]} of the study; default: those of development"
     parser.add_argument("--machines", nargs="+", type=int, default=list(ROUGH_DEVELOPMENT), help=known)
+    parser.add_argument("--page", action="store_true", help="write the table into docs/study.md and docs/study_learn.jsonl")
     given = parser.parse_args(arguments)
     scratch = given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-learn-"))
     scratch.mkdir(parents=True, exist_ok=True)
@@ -108,4 +122,8 @@ def main(arguments: Sequence[str]) -> None:
             done[key] = learned(scratch, *key)
             append_row(path, done[key])
         print(*key, {stage: (each["errors"], each["band"]) for stage, each in done[key]["stages"].items()}, *done[key]["notes"], flush=True)
-    print(f"\n{table([done[seed, name] for seed in given.machines for name in HELD_OUT])}")
+    rows = [done[seed, name] for seed in given.machines for name in HELD_OUT]
+    print(f"\n{table(rows)}")
+    if given.page:
+        write_rows(DOCS / "study_learn.jsonl", rows)
+        write_block("learn", table(rows))

@@ -7,13 +7,16 @@ lines, campaigns of 2000 cuts, recordings of 79 s of four channels. Where a limi
 from __future__ import annotations
 
 import base64
+import io
 import json
 import tempfile
 import time
+import wave
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import tomli_w
 
 from api.client import Client
@@ -241,6 +244,8 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
             _halved("{} segments", 2 * MOST_SEGMENTS, lambda _: ("/v1/toolings/T0/differences", _full(9)))
         ],
         "POST /toolings/import": [_halved("{} tools of a CAM library", 8192, library)],
+        "POST /listen": [iter([Ask("a minute of sound at 48 kHz", "/v1/listen", {"Content-Type": "audio/wav"}, _sound())])],
+        "POST /tap": [iter([Ask("20 hits in 20 s at 25.6 kHz", "/v1/tap", {"Content-Type": "text/csv"}, _hits())])],
         "POST /campaigns/preview": [_halved("200 files, a campaign of {} cuts", 2000, dropped)],
         "POST /tested-cuts/preview": [
             iter([Ask(f"{MOST_TESTED} cuts", "/v1/tested-cuts/preview", {"Content-Type": "text/csv"}, tests.encode())])
@@ -267,6 +272,32 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
         "POST /lobes": several("/v1/lobes"),
         "POST /advice": several("/v1/advice"),
     }
+
+
+def _sound() -> bytes:
+    """A minute of teeth at 400 Hz in noise, as a WAV file."""
+    time, rng = np.arange(60 * 48_000) / 48_000.0, np.random.default_rng(1)
+    heard = sum(np.cos(2.0 * np.pi * 400.0 * m * time) / m for m in range(1, 9)) + 0.1 * rng.standard_normal(time.size)
+    file = io.BytesIO()
+    with wave.open(file, "wb") as sound:
+        sound.setnchannels(1)
+        sound.setsampwidth(2)
+        sound.setframerate(48_000)
+        sound.writeframes((8000.0 * heard / np.abs(heard).max()).astype("<i2").tobytes())
+    return file.getvalue()
+
+
+def _hits() -> bytes:
+    """Hits of a hammer a second apart against one mode, as a table of text."""
+    rate, rng = 25_600.0, np.random.default_rng(1)
+    time = np.arange(int(20.0 * rate)) / rate
+    after = (time % 1.0) - 0.1
+    ringing = np.where(after > 0.0, 300.0 * np.exp(-60.0 * after) * np.sin(2.0 * np.pi * 1200.0 * after), 0.0)
+    force = 200.0 * np.exp(-0.5 * (after / 1e-4) ** 2)
+    columns = np.stack([time, force, ringing], axis=1) + [0.0, 0.02, 0.05] * rng.standard_normal((time.size, 3))
+    file = io.BytesIO()
+    np.savetxt(file, columns, fmt="%.6g", delimiter=",", header="time (s),hammer (N),tip (m/s^2)", comments="")
+    return file.getvalue()
 
 
 def _varied(raw: bytes, seed: int) -> bytes:

@@ -171,3 +171,25 @@ def test_a_tooling_file_of_a_name_that_is_taken_tells_how_it_differs(opened, cli
     drop(page, "section.drop", [tmp_path / "S9-taken.toml"])
     expect(page.locator(".note.bad")).to_have_text(re.compile("differs .cutter teeth 4 in the library, 3 in the file.; it stays as it is"))
     assert client.tooling("S9-taken").etag == before.etag
+
+
+def test_how_well_a_drawing_is_known_is_written_and_read_again(opened, client: Client):
+    client.write_tooling("S9-rough", by_hand.TOOLING)
+    page = opened("#/toolings/edit/S9-rough")
+    stickout = page.locator('[data-field="spread.stickout_mm"] input')
+    expect(stickout).to_be_hidden()
+    page.get_by_label("The drawing is").select_option("rough")
+    stickout.fill("0,3")
+    page.get_by_label("Model of the tool").fill("EM12-4")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.locator("tbody tr", has_text="changed the tooling S9-rough")).to_be_visible()
+    kept = client.tooling("S9-rough").tooling
+    assert kept.spread.model_dump(exclude_none=True) == {"stickout_mm": 0.3}
+    assert kept.tool.model == "EM12-4"
+    page.reload()
+    expect(stickout).to_have_value("0.3")
+    page.get_by_label("The drawing is").select_option("exact")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.locator("tbody tr", has_text="changed the tooling S9-rough")).to_have_count(2)
+    assert client.tooling("S9-rough").tooling.spread is None
+    client.forget_tooling("S9-rough")

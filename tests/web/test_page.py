@@ -204,7 +204,7 @@ def test_what_is_wrong_stands_beside_its_field(opened, served: Served, shop: str
     expect(page.locator("img.drawing")).to_have_class(re.compile("old"))
     bore.fill("12")
     expect(page.locator('[data-field="holder.segments.0.inner_diameter_mm"] .fault')).to_be_hidden()
-    page.get_by_label("Stickout").fill("900")
+    page.get_by_label("Stickout", exact=True).fill("900")
     assert "at most the tool's length" in fault_beside(page, "tool.stickout_mm")
     page.goto(f"{served.url}/#/")
     # what was edited is not thrown away unasked
@@ -226,7 +226,7 @@ def test_a_tooling_is_drawn_as_it_is_written(opened, client: Client, shop: str):
     expect(image).to_be_visible()
     assert page.evaluate("document.querySelector('img.drawing').naturalWidth") > 100
     first = image.get_attribute("src")
-    page.get_by_label("Stickout").fill("55")
+    page.get_by_label("Stickout", exact=True).fill("55")
     expect(image).not_to_have_attribute("src", first)
     page.get_by_role("button", name="Add one below").last.click()
     expect(page.locator("table.segments").last.locator("tbody tr")).to_have_count(2)
@@ -239,7 +239,7 @@ def test_a_tooling_is_drawn_as_it_is_written(opened, client: Client, shop: str):
     assert kept.contact == client.tooling("T1").tooling.contact
     # somebody else changes it meanwhile: nothing is overwritten
     client.write_tooling("T1-drawn", example())
-    page.get_by_label("Stickout").fill("50")
+    page.get_by_label("Stickout", exact=True).fill("50")
     page.get_by_role("button", name="Save").click()
     assert "Somebody else" in fault_beside(page, "name")
     assert client.tooling("T1-drawn").tooling.tool.stickout_mm == 70.5
@@ -273,7 +273,7 @@ def test_the_shape_of_a_cutter_is_kept_and_said(opened, client: Client, shop: st
 def test_a_longer_stickout_takes_the_tool_out_of_the_bore(opened):
     """A tool of 100 mm, 40 mm of it clamped: it keeps its length, and a shank of 12 mm sits 12 mm deep at least."""
     page = opened("#/toolings/new")
-    stickout, insertion = page.get_by_label("Stickout"), page.get_by_label("Insertion")
+    stickout, insertion = page.get_by_label("Stickout", exact=True), page.get_by_label("Insertion")
     shank = page.locator('[data-field="tool.segments.1.length_mm"] input')
     fault, image = page.locator('[data-field="tool.stickout_mm"] .fault'), page.locator("img.drawing")
     expect(image).to_have_attribute("src", re.compile("^blob:"))

@@ -7,6 +7,7 @@ import { go, holdsEdits, to } from "../router.js";
 import { machine } from "../state.js";
 import { q, text } from "../units.js";
 import { trail } from "./changes.js";
+import { doubtCard } from "./doubt_card.js";
 import { catalogueBox } from "./holder_catalogue.js";
 import { segmentsTable } from "./segments.js";
 import { SHAPES, START } from "./tooling_start.js";
@@ -52,6 +53,8 @@ export async function view({ name = "" }, query, place) {
     key,
     quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
   ]);
+
+  const doubts = doubtCard(keys);
 
   /** The diameter of the tool where it is clamped. */
   function shank() {
@@ -137,6 +140,7 @@ export async function view({ name = "" }, query, place) {
       ),
       h("p", { class: "small soft" }, "Per metre of insertion. All four empty: rigid."),
     ),
+    doubts.box,
   );
   add(
     place,
@@ -188,6 +192,7 @@ export async function view({ name = "" }, query, place) {
     delete found.contact;
     if (contact.some(([, box]) => box.input.base !== null))
       found.contact = Object.fromEntries(contact.map(([key, box]) => [key, box.input.base]));
+    doubts.write(found);
     if (called.value.trim()) found.name = found.name && name ? found.name : called.value.trim();
     else delete found.name;
     return found;

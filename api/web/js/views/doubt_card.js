@@ -1,0 +1,71 @@
+// What a drawing does not tell of a tooling: how well it is known, and which others share what is not.
+import { card, h } from "../dom.js";
+import { field, quantity, select } from "../forms.js";
+import { factor, plain } from "../units.js";
+
+// key, label, kind, and what stands for an empty field: what an honest drawing is good for
+const SPREADS = [
+  ["stickout_mm", "± Stickout", "length", 0.05, "A presetter's; 0.3 mm with a ruler"],
+  ["fluted_diameter_percent", "± Fluted diameter", "percent", 3, "Of an equivalent cylinder"],
+  ["youngs_modulus_percent", "± Young's modulus", "percent", 2, "Of the tool"],
+  ["contact_stiffness_percent", "± Contact stiffness", "percent", 40],
+  ["contact_damping_percent", "± Contact damping", "percent", 100],
+  ["holder_diameter_percent", "± Holder diameters", "percent", 0.5],
+  ["segment_length_mm", "± Segment lengths", "length", 0.05],
+  ["reclamping_percent", "± Reclamping", "percent", 10, "Contact, from clamping to clamping"],
+  ["spindle_joint_percent", "± Flange joint", "percent", 5, "From clamping to clamping"],
+];
+
+/** The card for the keys of a tooling, and `write(found)`, which puts what is chosen into the keys to send. */
+export function doubtCard(keys) {
+  const models = [
+    ["tool", "Model of the tool", "As EM12-4: the same wherever it is clamped"],
+    ["holder", "Model of the holder", "As PG25: holders of one model share their contact"],
+  ].map(([part, label, hint]) => {
+    const input = h("input", { autocomplete: "off", maxlength: 200 });
+    input.value = keys[part].model ?? "";
+    return [part, input, field(label, input, { name: `${part}.model`, hint })];
+  });
+  const known = select(
+    [
+      ["exact", "Exactly right"],
+      ["rough", "Roughly right"],
+    ],
+    keys.spread ? "rough" : "exact",
+  );
+  const spreads = SPREADS.map(([key, label, kind, usual, hint = ""]) => {
+    const props = { placeholder: plain(usual * factor(kind), 4) };
+    return [key, quantity(label, kind, keys.spread?.[key] ?? null, { name: `spread.${key}`, hint, props })];
+  });
+  const rough = h(
+    "div",
+    { class: "view" },
+    h(
+      "div",
+      { class: "fields" },
+      models.map(([, , box]) => box),
+      spreads.map(([, box]) => box),
+    ),
+    h(
+      "p",
+      { class: "small soft" },
+      "Standard deviations of what the drawing says. Empty: as well as drawings usually are; 0: exactly. Cuts teach what is not known, and ",
+      "what stays open widens the bands.",
+    ),
+  );
+  const show = () => (rough.hidden = known.value === "exact");
+  known.addEventListener("input", show);
+  show();
+  return {
+    box: card("How well the drawing is known", null, h("div", { class: "fields" }, field("The drawing is", known, { name: "spread" })), rough),
+    write(found) {
+      delete found.spread;
+      for (const [part, input] of models) {
+        delete found[part].model;
+        if (input.value.trim()) found[part].model = input.value.trim();
+      }
+      if (known.value === "rough")
+        found.spread = Object.fromEntries(spreads.filter(([, box]) => box.input.base !== null).map(([key, box]) => [key, box.input.base]));
+    },
+  };
+}
