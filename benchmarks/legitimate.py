@@ -270,7 +270,12 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
         "DELETE /campaigns/{id}/uploads/{name}": [iter([Ask("", f"{uploads}/f3.h5", _TUS)])],
         "POST /tooltip": [_halved("{} lines", MOST_LINES, lines("/v1/tooltip", machine=shop.machine, tooling=_full(0, _COMPUTED)))],
         "POST /lobes": several("/v1/lobes"),
-        "POST /advice": several("/v1/advice"),
+        "POST /advice": [
+            _halved(
+                f"{{}} toolings of {2 * _COMPUTED} segments, 160 speeds", MOST_TOOLINGS, lambda count: queried("/v1/advice", count)(160)
+            ),
+            _halved("full discretisation, {} speeds", MOST_SPEEDS, queried("/v1/advice", 1, method="full-discretisation")),
+        ],
     }
 
 
@@ -296,7 +301,7 @@ def _hits() -> bytes:
     force = 200.0 * np.exp(-0.5 * (after / 1e-4) ** 2)
     columns = np.stack([time, force, ringing], axis=1) + [0.0, 0.02, 0.05] * rng.standard_normal((time.size, 3))
     file = io.BytesIO()
-    np.savetxt(file, columns, fmt="%.6g", delimiter=",", header="time (s),hammer (N),tip (m/s^2)", comments="")
+    np.savetxt(file, columns, fmt="%.9g", delimiter=",", header="time (s),hammer (N),tip (m/s^2)", comments="")
     return file.getvalue()
 
 
