@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.machines import CUT, HELD_OUT
-from benchmarks.page import append_row, read_rows
+from benchmarks.page import DOCS, append_row, read_rows, write_block, write_rows
 from benchmarks.recommendation import DEEPEST, FEED, Truth, drawn_cut
 from benchmarks.rough import KINDS
 from benchmarks.rough_machines import ROUGH, RoughMachine, rough_machine
@@ -97,6 +97,7 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--scratch", type=Path, required=True, help="folder in which `benchmarks rough` has left its results")
     parser.add_argument("--machines", nargs="+", type=int, default=list(ROUGH), help="seeds")
     parser.add_argument("--cuts", type=int, default=CUTS, help="of each tooling")
+    parser.add_argument("--page", action="store_true", help="write the table into docs/study.md and docs/study_rough_recommendation.jsonl")
     given = parser.parse_args(arguments)
     path = given.scratch / "rough_recommendation.jsonl"
     known = {(row["machine"], row["tooling"], row["cut"]): row for row in read_rows(path)}
@@ -111,4 +112,8 @@ def main(arguments: Sequence[str]) -> None:
                 known[seed, name, k] = row
                 append_row(path, row)
                 print(json.dumps(row), flush=True)
-    print(f"\n{table([row for (seed, _, _), row in known.items() if seed in given.machines])}")
+    rows = [row for (seed, _, cut), row in known.items() if seed in given.machines and cut < given.cuts]
+    print(f"\n{table(rows)}")
+    if given.page:
+        write_rows(DOCS / "study_rough_recommendation.jsonl", rows)
+        write_block("rough_recommendation", table(rows))
