@@ -72,9 +72,9 @@ class SensorKeys(Body):
     )
     pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
     tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
-    gain_spread_percent: float | None = Field(None, description="Standard deviations that count where drawings are rough: of the gain, 2,")
-    cross_talk_percent: float | None = Field(None, description="of what the sensor feels of the other axis, 1.5,")
-    delay_spread_us: float | None = Field(None, description="and of its delay, 5.")
+    gain_spread_percent: float | None = Field(None, description="Standard deviation of the gain; 2. Counts where drawings are rough.")
+    cross_talk_percent: float | None = Field(None, description="Standard deviation of what it feels of the other axis; 1.5.")
+    delay_spread_us: float | None = Field(None, description="Standard deviation of its delay; 5.")
 
     def sensor(self, name: str) -> Sensor:
         """Return the sensor of a channel."""

@@ -1,6 +1,7 @@
 """The path of the example with a watch, and the README's pictures of it: ``python -m tests.web.example_path FOLDER``.
 
-Prints the seconds from the first click to each view that follows, on a service with its usual settings, and writes four pictures.
+Prints the seconds from the first click to each view that follows, on a service with one process for each kind of work, and writes
+four pictures.
 """
 
 from __future__ import annotations
