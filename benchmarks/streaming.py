@@ -84,7 +84,7 @@ def result_text() -> str:
 def begun(client: Client, machine: str) -> list[str]:
     """Upload the sample runs, have them identified again and again, and return the jobs once the first runs."""
     campaign = client.upload_folder(machine, DATA / "sample_runs").id
-    jobs = [client.identify_campaign(campaign, seed=seed).id for seed in range(1, 5)]
+    jobs = [client.identify_campaign(campaign, seed=seed).id for seed in range(1, 13)]
     while client.job(jobs[0]).state == "queued":
         time.sleep(0.2)
     time.sleep(5.0)

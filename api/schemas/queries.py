@@ -251,7 +251,9 @@ class ToolingLobes(Answer):
     method: str
     spindle_speed_rpm: list[float]
     limit_depth_mm: list[float | None]
-    limit_depth_low_mm: list[float | None] | None = Field(description="95 % of the machines that the records allow lie above it.")
+    limit_depth_low_mm: list[float | None] | None = Field(
+        description="95 % of the possible machines and cutting coefficients lie above it."
+    )
     limit_depth_high_mm: list[float | None] | None
     recommended_depth_mm: list[float | None]
     chatter_frequency_hz: list[float | None]
@@ -368,7 +370,7 @@ class ToolingAdvice(Answer):
     tooling: str
     stickout_mm: float
     lowest_limit_mm: float | None
-    common_stable_depth_mm: float | None = Field(description="Stable at every speed on all machines that the records allow.")
+    common_stable_depth_mm: float | None = Field(description="Stable at every speed with all possible machines and cutting coefficients.")
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
     recommended_by: str | None = Field(description="The method that computed the recommended cuts.")
     band: Band | None = Field(None, description="null without machines drawn from the records, or without a recommended cut.")

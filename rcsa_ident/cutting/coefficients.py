@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL, Range, remarks_of
@@ -48,6 +49,23 @@ class CuttingCoefficients(Shown):
         for name in ("tangential_spread", "ratio_spread", "edge_spread"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InputError(name, getattr(self, name), "a share from 0 to 1")
+
+    def after(self, tangential: tuple[float, float], ratio: tuple[float, float]) -> CuttingCoefficients:
+        """Return the same, as well known as cuts have left them.
+
+        Parameters
+        ----------
+        tangential, ratio : (float, float) [-]
+            What cuts found of the logarithm of K_tc and of k_rc beyond these values, and its standard deviation. Cuts feel K_tc, a
+            sensor's gain and a depth as one product: what they found is no better value, and counts as doubt.
+
+        Examples
+        --------
+        >>> round(CuttingCoefficients(902e6, 0.26).after((0.03, 0.04), (0.0, 0.02)).tangential_spread, 12)
+        0.05
+        """
+        spreads = (min(math.hypot(*found), 1.0) for found in (tangential, ratio))
+        return replace(self, **dict(zip(("tangential_spread", "ratio_spread"), spreads, strict=True)))
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

@@ -24,13 +24,14 @@ WIDEST, GROWTH = 16.0, 0.1
 
 
 class Doubted(StrEnum):
-    """What the directions of a variation belong to; the machine is whatever is none of the others."""
+    """What may not be known well enough; the machine is whatever is none of the others."""
 
     CONTACT = "the contact of tool and holder"
     TOOL = "the tool's fluted diameter and modulus"
     LENGTHS = "the tool's stickout and lengths"
     HOLDER = "the holder's diameter"
     STIFFNESS = "the tool-holder's stiffness"
+    COEFFICIENTS = "the cutting coefficients"
     MACHINE = "the machine"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.cutting.force import ForceCoefficient
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
@@ -240,7 +240,7 @@ class Identification(Shown):
             self.band,
             status=self.status,
             reasons=self.reasons,
-            identified_workpiece=self.workpiece,
+            identified_workpiece=workpiece_after(self.workpiece, {c.term: v for c, v in self.coefficients.items() if not c.tooling}),
             sensors=self.sensors,
             name=self.campaign,
             whole=self.whole,
@@ -251,6 +251,22 @@ class Identification(Shown):
         modes = {str(axis): part.modes.omega_n.size for axis, part in self.axes.items()}
         tests = sum(len(part.tests) for part in self.axes.values())
         return in_words(str(self.status), len(self.cut_ids), modes, self.reasons, tests)
+
+
+def workpiece_after(told: Workpiece | None, found: Mapping[ForceTerm, tuple[float, float]]) -> Workpiece | None:
+    """Return a campaign's workpiece whose coefficients are as well known as its cuts have left them.
+
+    Parameters
+    ----------
+    told : Workpiece or None
+    found : mapping of ForceTerm to (float, float) [-]
+        Logarithms of the factors on what was told, and their standard deviations; what is not there is known as told.
+    """
+    if told is None:
+        return None
+    known = told.coefficients
+    asked = ((ForceTerm.TANGENTIAL, known.tangential_spread), (ForceTerm.RATIO, known.ratio_spread))
+    return replace(told, coefficients=known.after(*(found.get(term, (0.0, spread)) for term, spread in asked)))
 
 
 def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence[str], tests: int = 0) -> str:

@@ -15,7 +15,7 @@ from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.machine import IdentifiedMachine, SpeedModel
 from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
-from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.result import AxisResult, Identification, workpiece_after
 from rcsa_ident.identification.status import Status
 from rcsa_ident.io.both_planes import both_planes_from_json, both_planes_to_json
 from rcsa_ident.io.drawings import axis_toolings_of, axis_toolings_to_json, known_toolings_of, known_toolings_to_json
@@ -223,12 +223,20 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         tuple(_speed_models(top)),
         status=Status(data["status"]),
         reasons=tuple(data["reasons"]),
-        identified_workpiece=workpiece_of(top.table("workpiece")) if "workpiece" in top else None,
+        identified_workpiece=workpiece_after(workpiece_of(top.table("workpiece")), _found(top)) if "workpiece" in top else None,
         sensors=tuple(sensor_of(name, table.data, where) for name, table in top.named_tables("sensors", default={}).items()),
         name=data["campaign"]["name"],
         whole=_whole(top),
         toolings=toolings,
     )
+
+
+def _found(top: Table) -> dict[ForceTerm, tuple[float, float]]:
+    """What cuts found of the coefficients that all toolings have in common: logarithms, and their standard deviations."""
+    tables = top.named_tables("coefficients", default={})
+    scales = {term: tables[term] for term in (ForceTerm.TANGENTIAL, ForceTerm.RATIO) if term in tables}
+    read = {term: (table.number("scale", above=0.0), table.number("std", least=0.0)) for term, table in scales.items()}
+    return {term: (math.log(scale), std / scale) for term, (scale, std) in read.items()}
 
 
 def _whole(table: Table) -> CoupledPosterior | None:

@@ -11,6 +11,7 @@ from scipy.fft import next_fast_len
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals._kernels import angle_signal, angle_sums, order_signal, order_sums, turned
+from rcsa_ident.signals.loud_part import BAND, decimated
 from rcsa_ident.signals.recording import BLOCK, LONGEST
 from rcsa_ident.signals.steady_part import hann
 
@@ -131,12 +132,15 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
         wanted = f"at least four revolutions, {4.0 / nominal_hz:.4g} s, sampled twice per turn"
         raise InputError("recording length", f"{n / rate:.4g} s", wanted)
     centred = samples - samples.mean(axis=0)
-    length = next_fast_len(4 * n, real=True)
-    power = np.sum(np.abs(np.fft.rfft(centred * hann(n)[:, None], length, axis=0)) ** 2, axis=1)
+    windowed, slower = centred * hann(n)[:, None], rate
+    if highest * (1.0 + search) * nominal_hz < BAND:
+        windowed, slower, _ = decimated(windowed, rate)
+    length = next_fast_len(4 * windowed.shape[0], real=True)
+    power = np.sum(np.abs(np.fft.rfft(windowed, length, axis=0)) ** 2, axis=1)
     step = 0.2 * rate / n / highest
     reach = np.ceil(search * nominal_hz / step)
     trial = nominal_hz + np.arange(-reach, reach + 1) * step
-    bins = np.outer(trial, np.arange(1, highest + 1)) * length / rate
+    bins = np.outer(trial, np.arange(1, highest + 1)) * length / slower
     low = np.minimum(np.floor(bins).astype(int), power.size - 2)
     score = np.sum((1.0 - (bins - low)) * power[low] + (bins - low) * power[low + 1], axis=1)
     return follow_speed(centred, rate, float(2.0 * np.pi * trial[int(np.argmax(score))]), highest)
@@ -377,7 +381,9 @@ def _fit(samples: FloatArray, comb: _Comb, highest: int, basis: FloatArray) -> t
     """Least-squares amplitudes (phases from the middle), and the coefficients of other columns, shape (n, k), that are fitted, too."""
     n, channels = samples.shape
     offset = samples.mean(axis=0)
-    data = np.concatenate([samples - offset, basis], axis=1)
+    data = np.empty((n, channels + basis.shape[1]))
+    np.subtract(samples, offset, out=data[:, :channels])
+    data[:, channels:] = basis
     sums = comb.sums(data, highest)
     # unknowns: complex exponentials -highest..highest, then the other columns
     both = np.concatenate([sums[:0:-1].conj(), sums])

@@ -161,17 +161,18 @@ def envelopes(omega, x, y, alpha, stiffness, teeth, speeds):
     ----------
     x, y : complex arrays, shape (d, n)
         The tips' direct receptances.
-    alpha : array, shape (2, 2)
-        [alpha0].
+    alpha : array, shape (d, 2, 2)
+        [alpha0] of each.
     """
     weights = node_weights(omega)
     limits = np.full((x.shape[0], speeds.size), np.nan)
     trace, determinant = np.empty(omega.size, dtype=np.complex128), np.empty(omega.size, dtype=np.complex128)
-    turned = alpha[0, 0] * alpha[1, 1] - alpha[0, 1] * alpha[1, 0]
     for i in range(x.shape[0]):
+        along, across = alpha[i, 0, 0], alpha[i, 1, 1]
+        turned = along * across - alpha[i, 0, 1] * alpha[i, 1, 0]
         size = 0.0
         for k in range(omega.size):
-            trace[k] = alpha[0, 0] * x[i, k] + alpha[1, 1] * y[i, k]
+            trace[k] = along * x[i, k] + across * y[i, k]
             determinant[k] = turned * (x[i, k] * y[i, k])
             size += abs(trace[k].real) + abs(trace[k].imag) + abs(determinant[k].real) + abs(determinant[k].imag)
         if math.isfinite(size):

@@ -26,6 +26,7 @@ _HELP = {
     Doubted.LENGTHS: "measure the stickout with a presetter",
     Doubted.HOLDER: "tap it, ring it or cut once",
     Doubted.STIFFNESS: "tap it or cut once",
+    Doubted.COEFFICIENTS: "calibrate them on a dynamometer",
     Doubted.MACHINE: "more cuts narrow it",
 }
 
@@ -82,25 +83,32 @@ def band_shares(tip: UncertainReceptance, process: MillingProcess, speed: float,
 
     Notes
     -----
-    Linear, by the zero-order limit half a change ahead and behind along each direction of the tip's spread. What cuts could not tell
-    apart hangs together: a group's share is what its exact knowledge would take away after that of the groups before it, contact and
-    tool first and the machine last, so that an inexpensive remedy is named before an expensive one.
+    Linear, by the zero-order limit half a change ahead and behind along each direction of the tip's spread, and for K_tc and k_rc. What
+    cuts could not tell apart hangs together: a group's share is what its exact knowledge would take away after that of the groups
+    before it, contact and tool first and the machine last, so that an inexpensive remedy is named before an expensive one.
     """
     if not tip.complete:
         return None
-    nodes = tip.thinned()
+    nodes, known = tip.thinned(), process.coefficients
     deepest, method = DEEPER * max_depth, ZeroOrder()
     speeds = np.linspace((1.0 - tolerance) * speed, (1.0 + tolerance) * speed, _SPEEDS if tolerance > 0.0 else 1)
 
-    def limits(values: np.ndarray, at: FloatArray) -> FloatArray:
-        return method.depths(nodes.omega, embedded(values, nodes), process, at, deepest)
+    def limits(values: np.ndarray, at: FloatArray, factors: FloatArray | None = None) -> FloatArray:
+        return method.depths(nodes.omega, embedded(values, nodes), process, at, deepest, factors)
 
     at = speeds[[int(np.argmin(limits(nodes.values[None], speeds)[0]))]]
-    change = nodes.spread
-    ends = [np.log(limits(nodes.values + sign * change, at)[:, 0]) for sign in (0.5, -0.5)]
+    change, unknowns = nodes.spread, nodes.unknowns()
+    logarithms = np.zeros((len(change), 2))
+    if known.tangential_spread or known.ratio_spread:
+        # two directions more, along which the tip stays
+        change = np.concatenate([change, np.zeros((2, *change.shape[1:]))])
+        logarithms = np.concatenate([logarithms, np.diag([known.tangential_spread, known.ratio_spread])])
+        unknowns = {name: np.pad(moves, ((0, 0), (0, 2))) for name, moves in unknowns.items()}
+        unknowns[Doubted.COEFFICIENTS] = np.eye(2, len(change), len(change) - 2)
+    ends = [np.log(limits(nodes.values + sign * change, at, np.exp(sign * logarithms))[:, 0]) for sign in (0.5, -0.5)]
     if not np.all(np.isfinite(ends)):
         return None
-    return shares_of(ends[0] - ends[1], nodes.unknowns(), float(at[0]))
+    return shares_of(ends[0] - ends[1], unknowns, float(at[0]))
 
 
 def shares_of(slopes: FloatArray, unknowns: Mapping[Doubted, FloatArray], speed: float) -> BandShares | None:

@@ -17,7 +17,7 @@ from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes, known_mo
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 _ZERO_ORDER = ZeroOrder()
-#: Machines drawn from what the records leave open.
+#: Machines drawn from what the records leave open, each with cutting coefficients of its own.
 DRAWS = 60
 #: How much deeper than asked for the zero-order method looks, for proportions.
 DEEPER = 5.0
@@ -46,7 +46,8 @@ def stability_lobes(
         Limits beyond it are not of interest.
     method : StabilityMethod, default ZeroOrder()
     draws : int
-        Machines drawn from what is not known of the tip, where it is an `UncertainReceptance` with a spread; below 2 none are drawn.
+        Machines drawn from what is not known of the tip and of the cutting coefficients, where the tip is an `UncertainReceptance` with
+        a spread; below 2 none are drawn.
     seed : int
         The same one draws the same machines, whatever the speeds are.
 
@@ -104,16 +105,21 @@ def _limits(
 def drawn_limits(
     tip: UncertainReceptance, process: MillingProcess, speeds: FloatArray, max_depth: float, draws: int = DRAWS, seed: int = 1
 ) -> FloatArray:
-    """Return the zero-order limits of tips drawn from a receptance's spread, shape (draws, n) [m], infinite beyond `max_depth`.
+    """Return the zero-order limits of tips drawn from a receptance's spread, each with coefficients of its own, shape (draws, n) [m].
 
     Notes
     -----
-    They are told from a part of the frequencies: close where the tip's receptance changes from line to line, far apart where a quintic
-    goes through it.
+    Infinite beyond `max_depth`. They are told from a part of the frequencies: close where the tip's receptance changes from line to line,
+    far apart where a quintic goes through it.
     """
-    nodes = tip.thinned()
+    nodes, known = tip.thinned(), process.coefficients
     tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes)
-    return _ZERO_ORDER.depths(nodes.omega, tips, process, speeds, max_depth)
+    factors = None
+    if known.tangential_spread or known.ratio_spread:
+        # from draws of their own, so that machines are the same ones whatever is known of the coefficients
+        weights = np.random.default_rng([seed, 1]).standard_normal((draws, 2))
+        factors = np.exp(weights * (known.tangential_spread, known.ratio_spread))
+    return _ZERO_ORDER.depths(nodes.omega, tips, process, speeds, max_depth, factors)
 
 
 def both_directions(tip: Receptance) -> Receptance:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -80,7 +80,15 @@ class ZeroOrder:
             withheld=unlike,
         )
 
-    def depths(self, omega: FloatArray, tips: ComplexArray, process: MillingProcess, speeds: FloatArray, max_depth: float) -> FloatArray:
+    def depths(
+        self,
+        omega: FloatArray,
+        tips: ComplexArray,
+        process: MillingProcess,
+        speeds: FloatArray,
+        max_depth: float,
+        factors: FloatArray | None = None,
+    ) -> FloatArray:
         """Return the limits of many tips, as `lobes` does for each of them.
 
         Parameters
@@ -90,13 +98,17 @@ class ZeroOrder:
             The receptances in X and Y; a rigid direction is zero.
         speeds : array, shape (m,) [rad/s]
             In any order.
+        factors : array, shape (d, 2) [-], or None
+            On K_tc and k_rc of the cut with each tip.
 
         Returns
         -------
         array, shape (d, m) [m]
             Infinite beyond `max_depth`.
         """
-        alpha = _directions(process)
+        alpha = np.repeat(_directions(process)[None], len(tips), axis=0)
+        if factors is not None:
+            alpha += (factors[:, 1] - 1.0)[:, None, None] * _of_ratio(process)
         kept = _above_rest(omega)
         omega = np.ascontiguousarray(omega[kept])
         x, y = (np.ascontiguousarray(tips[:, kept, i, i]) for i in range(2))
@@ -107,8 +119,9 @@ class ZeroOrder:
         if _equal_pitch(process) and not np.any(xy) and not np.any(yx):
             found = envelopes(omega, x, y, alpha, stiffness, teeth, ascending)
         else:
-            traces = alpha[0, 0] * x + alpha[0, 1] * yx + alpha[1, 0] * xy + alpha[1, 1] * y
-            determinants = _determinant(alpha) * (x * y - xy * yx)
+            xx, down, up, yy = alpha.reshape(-1, 4).T[:, :, None]
+            traces = xx * x + down * yx + up * xy + yy * y
+            determinants = (xx * yy - down * up) * (x * y - xy * yx)
             _finite(traces, determinants)
             each = zip(traces, determinants, strict=True)
             if _equal_pitch(process):
@@ -116,6 +129,8 @@ class ZeroOrder:
             else:
                 found = np.array([pitch_envelope(omega, t, d, stiffness, pitch, ascending)[0] for t, d in each])
         _finite(np.where(np.isinf(found), 0.0, found))
+        if factors is not None:
+            found = found / factors[:, :1]
         limits = np.empty(found.shape)
         limits[:, order] = np.where(found <= max_depth, found, np.inf)
         return limits
@@ -129,6 +144,12 @@ def _directions(process: MillingProcess) -> FloatArray:
         allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
         raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
     return mean_directional_matrix(process.cutter.teeth, process.engagement, process.coefficients, process.feed_angle)
+
+
+def _of_ratio(process: MillingProcess) -> FloatArray:
+    """What of [alpha0] is in proportion to k_rc."""
+    known = process.coefficients
+    return 2.0 * (_directions(process) - _directions(replace(process, coefficients=replace(known, radial_ratio=0.5 * known.radial_ratio))))
 
 
 def _equal_pitch(process: MillingProcess) -> bool:

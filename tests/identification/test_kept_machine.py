@@ -45,7 +45,12 @@ TOOLINGS = {"stout": setups.tooling_of(example(), "", "stout"), "slender": slend
 
 
 def process(tooling, **further):
-    return MillingProcess(tooling.cutter, CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.5, "down"), **further)
+    return MillingProcess(
+        tooling.cutter,
+        CuttingCoefficients(9e8, 0.3, tangential_spread=0.0, ratio_spread=0.0),
+        Engagement.from_immersion(0.5, "down"),
+        **further,
+    )
 
 
 def plainly(assembly, share):

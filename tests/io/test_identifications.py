@@ -79,9 +79,15 @@ def test_coefficients_are_factors_and_micrometres(path):
     assert data["notes"] == ["joint: its rotational damping cannot be told"]
 
 
-def test_the_workpiece_comes_back_with_its_spreads(path, tmp_path):
-    campaign = by_hand.campaign(tmp_path)
-    assert machine_from_json(read_result(path), "").workpiece == campaign.workpiece
+def test_the_workpiece_comes_back_with_what_cuts_left_open_of_it(path, tmp_path, found):
+    """K_tc was found a quarter higher, to 2 %: so far the told one may be off. Of k_rc nothing was found."""
+    told, read = by_hand.campaign(tmp_path).workpiece, machine_from_json(read_result(path), "").workpiece
+    assert read == replace(told, coefficients=replace(told.coefficients, tangential_spread=read.coefficients.tangential_spread))
+    assert read.coefficients.tangential_spread == pytest.approx(math.hypot(math.log(1.25), 0.02))
+    # the file and the answer itself say the same
+    assert replace(found, workpiece=told).machine.workpiece.coefficients.tangential_spread == pytest.approx(
+        read.coefficients.tangential_spread
+    )
 
 
 def test_standard_deviations_stand_beside_the_modes(tmp_path, found):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.uncertain import Doubted, UncertainReceptance, Variation
 from rcsa_ident.stability.dominance import DOMINANT, WIDE, BandShares, band_shares, shares_of
 from rcsa_ident.stability.lobes import drawn_limits
-from tests.stability.test_lobes import DEEPEST, OMEGA, PROCESS
+from tests.stability.test_lobes import DEEPEST, EXACT, OMEGA, PROCESS
 
 
 def test_a_limit_that_two_groups_scale():
@@ -25,6 +25,18 @@ def test_a_limit_that_two_groups_scale():
     assert found.words == (
         "80 % of the band of this limit (standard deviation 13 %) is the contact of tool and holder: tap it, ring it or cut once"
     )
+
+
+def test_coefficients_have_a_share():
+    """K_tc scales the limit alone: with 0.06 of the machine, 0.08 of it, and nothing of k_rc it holds 64 %."""
+    process = replace(PROCESS, coefficients=replace(EXACT, tangential_spread=0.08))
+    found = band_shares(tip_of(lambda values: [0.06 * values], {}), process, 800.0, DEEPEST, 0.0)
+    assert found.deviation == pytest.approx(0.1, rel=2e-3)
+    assert found.shares == pytest.approx({Doubted.COEFFICIENTS: 0.64, Doubted.MACHINE: 0.36}, abs=2e-3)
+    assert found.words.endswith("is the cutting coefficients: calibrate them on a dynamometer")
+    # along X alone, half immersion, the ratio moves the limit, too
+    both = replace(process, coefficients=replace(EXACT, tangential_spread=0.08, ratio_spread=0.05))
+    assert band_shares(tip_of(lambda values: [0.06 * values], {}), both, 800.0, DEEPEST, 0.0).deviation > found.deviation
 
 
 def test_shares_are_the_variances_of_machines_that_differ_in_one_group_alone():

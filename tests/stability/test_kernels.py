@@ -70,9 +70,10 @@ def test_envelopes_of_many_tips_are_those_of_each():
     x = np.array([model(w)[0, 0] for w in OMEGA]) * np.array([[1.0], [1.1], [0.9 - 0.1j], [1.0]])
     y = np.array([model(w)[1, 1] for w in OMEGA]) * np.array([[1.0], [0.8], [0.0], [np.nan]])
     speeds = np.array([900.0, 1333.0, 2000.0])
-    found = kernels.envelopes(OMEGA, x, y, ALPHA, STIFFNESS, 3, speeds)
-    for i in range(3):
-        trace, determinant = ALPHA[0, 0] * x[i] + ALPHA[1, 1] * y[i], np.linalg.det(ALPHA) * x[i] * y[i]
+    alpha = ALPHA * np.array([[[1.0, 1.0], [1.0, 1.0]], [[1.0, 0.9], [1.2, 0.8]], [[0.7, 1.0], [1.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]]])
+    found = kernels.envelopes(OMEGA, x, y, alpha, STIFFNESS, 3, speeds)
+    for i, each in enumerate(alpha[:3]):
+        trace, determinant = each[0, 0] * x[i] + each[1, 1] * y[i], np.linalg.det(each) * x[i] * y[i]
         np.testing.assert_allclose(found[i], kernels.envelope(OMEGA, trace, determinant, STIFFNESS, 3, speeds)[0], rtol=1e-9)
     assert np.all(np.isnan(found[3]))
 

@@ -27,7 +27,8 @@ from tests.stability.test_tip_modes import models, receptance
 
 OMEGA = 2.0 * np.pi * np.arange(100.0, 3000.0, 2.0)
 SPEEDS = np.array([600.0, 800.0, 1100.0])
-PROCESS = MillingProcess(Cutter(2, 0.012), CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.5, "down"), 0.3)
+EXACT = CuttingCoefficients(9e8, 0.3, tangential_spread=0.0, ratio_spread=0.0)
+PROCESS = MillingProcess(Cutter(2, 0.012), EXACT, Engagement.from_immersion(0.5, "down"), 0.3)
 DEEPEST = 0.1
 
 
@@ -79,6 +80,24 @@ def test_probability_of_stability_of_a_scale(method, draws):
     np.testing.assert_allclose(share, np.repeat(expected[:, None], 3, axis=1), atol=1.0 / draws)
     exact = scipy.stats.norm.cdf(10.0 * (1.0 / ratio - 1.0))
     np.testing.assert_allclose(share, np.repeat(exact[:, None], 3, axis=1), atol=3.0 * 0.5 / np.sqrt(draws))
+
+
+@pytest.mark.parametrize("spreads", [(0.1, 0.0), (0.0, 0.1), (0.08, 0.05)])
+def test_drawn_limits_are_those_of_drawn_coefficients(spreads):
+    known = replace(EXACT, tangential_spread=spreads[0], ratio_spread=spreads[1])
+    found = asked(known_but_for_its_scale(0.0), process=replace(PROCESS, coefficients=known))
+    weights = np.random.default_rng([1, 1]).standard_normal((60, 2)) * spreads
+    for row, (tangential, ratio) in zip(found.drawn, np.exp(weights), strict=True):
+        drawn = replace(known, tangential=9e8 * tangential, radial_ratio=0.3 * ratio)
+        limit = asked(known_but_for_its_scale(0.0), process=replace(PROCESS, coefficients=drawn), draws=0).limit_depth
+        np.testing.assert_allclose(row, limit, rtol=1e-5)
+    assert np.std(np.log(found.drawn[:, 0])) > 0.8 * spreads[0]
+
+
+def test_a_machine_is_drawn_alike_whatever_is_known_of_the_coefficients():
+    tip, known = known_but_for_its_scale(0.1), replace(EXACT, tangential_spread=0.1)
+    ratio = asked(tip, process=replace(PROCESS, coefficients=known)).drawn / asked(tip).drawn
+    np.testing.assert_allclose(np.log(ratio), -0.1 * np.random.default_rng([1, 1]).standard_normal((60, 2))[:, :1] * np.ones(3), atol=1e-12)
 
 
 def test_probability_and_bands_tell_the_same():
