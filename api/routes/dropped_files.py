@@ -9,7 +9,7 @@ from api.components import ThisService
 from api.conventions import BODY, guard, problems, utf8
 from api.problems import Problem
 from api.reading.dropped import look_at
-from api.schemas.dropped_files import DroppedAnswer, DroppedFiles, DroppedToolingAnswer, TestedCutsAnswer, tested_cut
+from api.schemas.dropped_files import MOST_DIFFERENCES, DroppedAnswer, DroppedFiles, DroppedToolingAnswer, TestedCutsAnswer, tested_cut
 from api.schemas.queries import MOST_TESTED
 from api.schemas.versions import Difference
 from api.security import Guarded, WhoAsks
@@ -42,7 +42,8 @@ async def preview(asked: DroppedFiles, components: ThisService, caller: WhoAsks)
                 key=each.key,
                 listed=each.listed,
                 etag=None if each.there is None else digest_of(each.there),
-                differences=[Difference(field=field, old=old, new=new) for field, old, new in each.differences],
+                differences=[Difference(field=field, old=old, new=new) for field, old, new in each.differences[:MOST_DIFFERENCES]],
+                differing=len(each.differences),
             )
             for each in found.toolings
         ]

@@ -12,6 +12,9 @@ from api.schemas.versions import Difference
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.tested_cuts import COLUMNS
 
+#: Fields of one tooling that are told; 200 toolings of 400 segments would differ in 300 000.
+MOST_DIFFERENCES = 50
+
 
 class DroppedFile(Body):
     """A TOML file."""
@@ -33,7 +36,8 @@ class DroppedToolingAnswer(Answer):
     key: str = Field(description="Its name in the library and in the campaign, which need not be the file's.")
     listed: bool = Field(description="Whether the campaign names it.")
     etag: str | None = Field(description="Of the tooling in the library, for If-Match; null where there is none.")
-    differences: list[Difference] = Field(description="From the library's to the dropped one.")
+    differences: list[Difference] = Field(description=f"From the library's to the dropped one, the first {MOST_DIFFERENCES}.")
+    differing: int = Field(description="How many fields differ in all.")
 
 
 class DroppedAnswer(Answer):

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from api.schemas.dropped_files import MOST_DIFFERENCES
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
 from tests.fixtures.paths import SAMPLES
@@ -39,10 +40,21 @@ def test_what_differs_from_the_library_and_what_is_missing(client):
     found = client.preview({"a.toml": THREE, "c.toml": text, "notes.toml": "x = 1"})
     assert (found.campaign, found.missing, found.others) == ("c.toml", ["S2"], ["notes.toml"])
     assert [(d.field, d.old, d.new) for d in found.toolings[0].differences] == [("cutter.teeth", 4, 3)]
-    assert found.toolings[0].etag == etag
+    assert (found.toolings[0].etag, found.toolings[0].differing) == (etag, 1)
     client.write_tooling("S2", by_hand.TOOLING)
     found = client.preview({"c.toml": text})
     assert (found.missing, found.from_library, found.toolings) == ([], ["S1", "S2"], [])
+
+
+def test_a_tooling_of_many_fields_tells_the_first_that_differ(client):
+    """The answer on 200 toolings of 400 segments stays small."""
+    segment = '{{ length_mm = {}, outer_diameter_mm = 12.0, material = "carbide" }}'
+    drawn = [re.sub(r"segments = .*carbide.*", f"segments = [{', '.join([segment.format(n)] * 40)}]", by_hand.TOOLING) for n in (2.5, 2.6)]
+    client.write_tooling("S1", drawn[0])
+    (only,) = client.preview({"S1.toml": drawn[1]}).toolings
+    assert (only.differing, [d.field for d in only.differences]) == (40, [f"tool.segments.{k}.length_mm" for k in range(40)])
+    (only,) = client.preview({"S1.toml": drawn[1].replace("carbide", "steel")}).toolings
+    assert (only.differing, len(only.differences)) == (80, MOST_DIFFERENCES)
 
 
 def test_errors_name_file_and_key(client):

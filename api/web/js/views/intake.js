@@ -146,6 +146,7 @@ function offer(place, found) {
         { class: "view", "data-tooling": t.key },
         note("doubt", `${t.key} is in the library already, and differs:`),
         differing(t.differences, "In the library", "Dropped"),
+        t.differing > t.differences.length ? note("", `${t.differing - t.differences.length} further fields differ.`) : null,
         field(`What to do with ${t.key}`, t.choice),
       ),
     ),
