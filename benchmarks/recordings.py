@@ -123,14 +123,15 @@ def costs() -> list[str]:
     """Return the times of records that are made here."""
     lines = ["| record | time [s] |", "|---|---|"]
     rng = np.random.default_rng(1)
-    for name, rate, seconds, channels, quantity in (
-        ("sound of a phone, 10 s at 48 kHz", 48000.0, 10.0, 1, Quantity.SOUND),
-        ("three accelerometers, 60 s at 51.2 kHz", 51200.0, 60.0, 3, Quantity.ACCELERATION),
+    for name, rate, seconds, channels, quantity, hertz in (
+        ("sound of a phone, 10 s at 48 kHz, 7200 rev/min", 48000.0, 10.0, 1, Quantity.SOUND, 120.0),
+        ("three accelerometers, 60 s at 51.2 kHz, 7200 rev/min", 51200.0, 60.0, 3, Quantity.ACCELERATION, 120.0),
+        ("three accelerometers, 60 s at 51.2 kHz, 1500 rev/min", 51200.0, 60.0, 3, Quantity.ACCELERATION, 25.0),
     ):
         n = int(rate * seconds)
         knots = np.arange(0.0, seconds + 1.0, 0.3)
         wander = np.interp(np.arange(n) / rate, knots, 1e-3 * rng.standard_normal(knots.size))
-        angle = 2.0 * np.pi * np.cumsum(120.0 * (1.0 + wander)) / rate
+        angle = 2.0 * np.pi * np.cumsum(hertz * (1.0 + wander)) / rate
         signal = sum(a * np.cos(m * angle) for m, a in {1: 0.2, 4: 1.0, 5: 0.1, 8: 0.5, 12: 0.3}.items())
         records = [signal + 0.3 * rng.standard_normal(n) for _ in range(channels)]
         listen_to(rate, [each[: int(2.0 * rate)] for each in records], quantity)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_toeplitz
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.signals._kernels import angle_signal, angle_sums, turned
@@ -70,15 +71,16 @@ def order_lines(samples: FloatArray, angle: FloatArray, length: int, highest: in
     starts = np.arange(0, n - length + 1, length)
     windows, flat, turn = starts.size, np.ones(length), turned(angle)
     centred = _centred(samples, length)
-    # unknowns of a window are complex exponentials of the orders -m to m, whose products are exponentials of twice as many orders
+    # unknowns of a window are complex exponentials of the orders -m to m, whose products are exponentials of twice as many orders: the
+    # same one for all pairs that are as far apart
     products = _both_sides(angle_sums(np.ones((n, 1)), turn, starts, flat, 2 * highest))[:, :, 0]
-    order = np.arange(2 * highest + 1)
-    matrix = products[:, order[:, None] - order[None, :] + 2 * highest]
     sums = _both_sides(angle_sums(centred, turn, starts, flat, highest))
     if highest * (angle[-1] - angle[0]) < np.pi * n:
-        solution, used = np.linalg.solve(matrix, sums), order.size * windows
+        solution = np.array([solve_toeplitz(own[2 * highest :], right) for own, right in zip(products, sums, strict=True)])
+        used = sums.shape[0] * sums.shape[1]
     else:
-        value, vector = np.linalg.eigh(matrix)
+        order = np.arange(2 * highest + 1)
+        value, vector = np.linalg.eigh(products[:, order[:, None] - order[None, :] + 2 * highest])
         inverse = np.where(value > _TOLD_APART * length, 1.0 / np.maximum(value, 1e-300), 0.0)[:, :, None]
         solution, used = vector @ (inverse * (np.conj(np.swapaxes(vector, 1, 2)) @ sums)), int(np.sum(inverse > 0.0))
     energy, explained = float(np.sum(centred**2)), float(np.real(np.sum(np.conj(solution) * sums)))
