@@ -1,18 +1,26 @@
-"""Pictures of every view, light and dark, wide and on a phone: ``python -m tests.web.shots FOLDER``, to be looked at."""
+"""Pictures of every view and of what views come to, light and dark, wide and on a phone: ``python -m tests.web.shots FOLDER [NAME …]``.
+
+To be looked at. Names are those of `views` and of `states`.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 from playwright.sync_api import Browser, Page, sync_playwright
+from scipy.io import wavfile
 
 from api.client import Client
+from tests.api.test_listening import samples, text_of_hits
+from tests.fixtures import by_hand
 from tests.fixtures.service import serving
 from tests.fixtures.waiting import until
-from tests.web.conftest import CHROMIUM, QUIET
+from tests.web.conftest import CHROMIUM, QUIET, drop
+from tests.web.test_changes import dropped
 
 SIZES = {"wide": {"width": 1440, "height": 900}, "phone": {"width": 390, "height": 844}}
 SCHEMES = ("light", "dark")
@@ -51,6 +59,53 @@ def views(machine: str, campaign: str, job: str) -> dict[str, str]:
     }
 
 
+def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable[[Page], None]]]:
+    """Return what somebody does in a view, by names for files: its address, and how what is shown comes about."""
+    sound, hits = folder / "cut.wav", folder / "hits.csv"
+    wavfile.write(sound, 22050, samples().astype(np.float32))
+    hits.write_bytes(text_of_hits())
+
+    def heard(page: Page) -> None:
+        drop(page, "h1", [sound])
+        page.wait_for_selector(".heard")
+
+    def tapped(page: Page) -> None:
+        drop(page, "h1", [hits])
+        page.wait_for_selector("main .chart .main-svg")
+
+    def forces_shown(page: Page) -> None:
+        page.get_by_role("button", name="Show forces").first.click()
+        page.wait_for_selector("main .chart .main-svg")
+
+    def holder_taken(page: Page) -> None:
+        page.get_by_text("Take one from the catalogue").click()
+        page.get_by_role("button", name="Take this holder").click()
+        page.wait_for_selector("details .note")
+
+    def edits_left(page: Page) -> None:
+        page.get_by_label("Teeth", exact=True).fill("7")
+        page.locator("nav").get_by_role("link", name="Toolings", exact=True).first.click()
+        page.wait_for_selector("dialog[open]")
+
+    def intake(page: Page) -> None:
+        dropped(page, folder, "Shop tool")
+
+    def exact(page: Page) -> None:
+        page.get_by_label("Method").select_option("full-discretisation")
+        page.wait_for_timeout(1500)
+
+    return {
+        "heard": (known["listen"], heard),
+        "tapped": (known["tap"], tapped),
+        "forces_shown": (known["forces"], forces_shown),
+        "holder_taken": (known["new_tooling"], holder_taken),
+        "edits_left": (known["tooling"], edits_left),
+        "intake": (known["machines"], intake),
+        "exact": (known["change"], exact),
+        "identifying": (known["identifications"], lambda page: page.wait_for_timeout(500)),
+    }
+
+
 def settled(page: Page) -> None:
     """Wait until a view shows what it will show."""
     page.wait_for_selector("h1, main .note")
@@ -78,7 +133,9 @@ def main(folder: Path, *chosen: str) -> None:
             for name, page in pages(browser, served.url):
                 settled(page)
                 page.screenshot(path=folder / f"empty-{name}.png", full_page=True)
-            known = views(*example_job(client))
+            machine, campaign, job = example_job(client)
+            client.write_tooling("Shop tool", by_hand.TOOLING)
+            known = views(machine, campaign, job)
             for name, page in pages(browser, served.url):
                 for view, address in known.items():
                     if chosen and view not in chosen:
@@ -86,6 +143,20 @@ def main(folder: Path, *chosen: str) -> None:
                     page.goto(f"{served.url}/{address}")
                     settled(page)
                     page.screenshot(path=folder / f"{view}-{name}.png", full_page=True)
+            for seed in (2, 3):
+                client.identify_campaign(campaign, seed=seed)
+            for name, page in pages(browser, served.url):
+                for state, (address, come) in states(known, Path(data)).items():
+                    if chosen and state not in chosen:
+                        continue
+                    # each in a tab of its own: what the one before has not saved would be asked for
+                    tab = page.context.new_page()
+                    tab.goto(f"{served.url}/{address}")
+                    settled(tab)
+                    come(tab)
+                    tab.wait_for_timeout(500)
+                    tab.screenshot(path=folder / f"{state}-{name}.png", full_page=state != "edits_left")
+                    tab.close()
         browser.close()
 
 

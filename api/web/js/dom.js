@@ -75,6 +75,9 @@ export function mark(kind, word) {
   return h("span", { class: `mark ${kind}`, "data-sign": signs[kind] }, word);
 }
 
+/** Words as a sentence of their own. */
+export const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
+
 export function note(kind, ...children) {
   return h(
     "div",

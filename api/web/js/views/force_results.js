@@ -1,5 +1,5 @@
 // Forces of a recording: over time, in numbers, and line by line.
-import { card, fill, h, note, table } from "../dom.js";
+import { card, fill, h, note, sentence, table } from "../dom.js";
 import { axis, chart, colour, legend, safe, SERIES } from "../charts.js";
 import { busy, failed } from "../forms.js";
 import { factor, plain, q, significant, unit } from "../units.js";
@@ -20,7 +20,7 @@ export function forceResults(place, found, name, download) {
   );
   fill(
     place,
-    found.notes.length ? note("doubt", ...found.notes) : null,
+    found.notes.length ? note("doubt", ...found.notes.map(sentence)) : null,
     fault,
     card(
       `Forces of ${name}`,

@@ -19,7 +19,8 @@ async function choices(place, shank, take) {
     tapers[0],
   );
   const kinds = chucks.map(({ name, least_bore_mm: least, largest_bore_mm: most }) => [name, `${name}: ${plain(least, 1)} to ${plain(most, 1)} mm`]);
-  const chuck = select(kinds, kinds[0][0]);
+  const holds = chucks.find(({ least_bore_mm: least, largest_bore_mm: most }) => least <= shank() && shank() <= most);
+  const chuck = select(kinds, (holds ?? chucks[0]).name);
   const length = quantity("Length", "length", null, { hint: "Nose to spindle face or gauge line. Empty: a typical one" });
   const told = h("div", { role: "status" });
   const button = h("button", { type: "button" }, "Take this holder");

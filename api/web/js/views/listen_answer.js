@@ -1,6 +1,6 @@
 // What a recording says, in words first, then drawn.
 import { chart, legend } from "../charts.js";
-import { card, h, mark, note } from "../dom.js";
+import { card, h, mark, note, sentence } from "../dom.js";
 import { orderFigure, signalFigure, spectrogramFigure } from "../listen_figures.js";
 import { plain, significant } from "../units.js";
 
@@ -29,8 +29,6 @@ export function listenAnswer(found, file) {
 
 /** The verdict in a line. */
 export const said = (found) => `${SAID[found.verdict]}${found.spindle_speed_rpm === null ? "" : `, at ${plain(found.spindle_speed_rpm)} rev/min`}`;
-
-const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
 
 function headline(found) {
   const [chatter] = found.chatter_frequencies_hz;
