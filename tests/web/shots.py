@@ -88,7 +88,7 @@ def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable
         page.wait_for_selector("dialog[open]")
 
     def intake(page: Page) -> None:
-        dropped(page, folder, "Shop tool")
+        dropped(page, folder, "S9-shop")
 
     def exact(page: Page) -> None:
         page.get_by_label("Method").select_option("full-discretisation")
@@ -134,7 +134,7 @@ def main(folder: Path, *chosen: str) -> None:
                 settled(page)
                 page.screenshot(path=folder / f"empty-{name}.png", full_page=True)
             machine, campaign, job = example_job(client)
-            client.write_tooling("Shop tool", by_hand.TOOLING)
+            client.write_tooling("S9-shop", by_hand.TOOLING)
             known = views(machine, campaign, job)
             for name, page in pages(browser, served.url):
                 for view, address in known.items():
