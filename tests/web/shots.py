@@ -39,6 +39,7 @@ def views(machine: str, campaign: str, job: str) -> dict[str, str]:
         "identification": f"#/identifications/{job}",
         "toolings": "#/toolings",
         "tooling": "#/toolings/edit/Example S3-PG25-long",
+        "ring": "#/toolings/ring/Example S3-PG25-long",
         "new_tooling": "#/toolings/new",
         "changes": "#/changes",
         "change": f"#/change?machine={machine}&tooling=Example S4-shrink",

@@ -49,6 +49,8 @@ export async function view({ name = "" }, query, place) {
   });
   const tool = segmentsTable("Tool, from its tip", "tool.segments", keys.tool.segments, () => changed());
   const holder = segmentsTable("Holder, from the tool to the flange", "holder.segments", keys.holder.segments, () => changed());
+  const taper = h("input", { autocomplete: "off", maxlength: 200 });
+  taper.value = keys.holder.taper ?? "";
   const contact = CONTACT.map(([key, label, unit]) => [
     key,
     quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
@@ -129,7 +131,13 @@ export async function view({ name = "" }, query, place) {
       offer,
     ),
     card("Tool", null, tool.box),
-    card("Holder", null, holder.box, catalogueBox(shank, takeHolder)),
+    card(
+      "Holder",
+      null,
+      holder.box,
+      catalogueBox(shank, takeHolder),
+      h("div", { class: "fields" }, field("Taper behind the flange", taper, { name: "holder.taper", hint: "As HSK-A63 or BT40: what rings with it on a string", double: true })),
+    ),
     card(
       "Contact between tool and holder",
       null,
@@ -148,6 +156,7 @@ export async function view({ name = "" }, query, place) {
       title,
       null,
       name && machine()?.identification ? link(to("change", { tooling: name }), "Lobes", "button") : null,
+      name ? link(to(`toolings/ring/${part(name)}`), "Ring it", "button quiet") : null,
       name ? link(to("toolings/new", { from: name }), "Copy", "button quiet") : null,
       name ? h("button", { type: "button", class: "quiet", onclick: download }, "TOML file") : null,
       name ? h("button", { type: "button", class: "quiet danger", onclick: remove }, "Delete") : null,
@@ -178,6 +187,8 @@ export async function view({ name = "" }, query, place) {
       tool: { ...keys.tool, stickout_mm: stickout.input.base, segments: tool.rows() },
       holder: { ...keys.holder, insertion_mm: insertion.input.base, segments: holder.rows() },
     };
+    if (taper.value.trim()) found.holder.taper = taper.value.trim();
+    else delete found.holder.taper;
     if (shape.value === "flat") delete found.cutter.shape;
     else found.cutter.shape = shape.value;
     if (corner.input.base) found.cutter.corner_radius_mm = corner.input.base;
