@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from api.jobs.job_context import JobContext
-from api.reading.campaigns import anonymous
 from api.stores.entities import digest_of, whole
 from api.stores.jobs import Applied, Job, Outcome
 from api.work import tasks
 from api.work.machine_cache import starts
+from api.work.requests import anonymous
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 from api.files import NORMALISED, Files
 from api.reading.campaign_text import campaign_of_text
@@ -19,8 +18,6 @@ from rcsa_ident.signals.recording import Recording
 
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
 ReadTest = Callable[[HammerTest], tuple[FloatArray, ComplexArray]]
-_T = TypeVar("_T")
-_R = TypeVar("_R")
 
 
 def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> tuple[Campaign, ReadCut, ReadTest]:
@@ -48,14 +45,6 @@ def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> t
         raise InputError("campaign", "no recording of a cut", "a campaign with recordings")
     cuts = tuple(replace(cut, air=None) if cut.air == Path() else cut for cut in there)
     return replace(found, cuts=cuts, tests=tests), partial(_read_whole, samples), partial(_read_test, samples)
-
-
-def anonymous(read: Callable[[_T], _R], each: _T) -> _R:
-    """Return what is read of a cut or a hammer test; errors do not tell where the service keeps its files."""
-    try:
-        return read(each)
-    except InputError as error:
-        raise InputError(error.field, error.found, error.allowed) from None
 
 
 def _read_whole(samples: Samples, cut: Cut) -> tuple[Recording, Recording | None]:

@@ -33,7 +33,7 @@ _POINTS, _LINES, _COLUMNS, _ROWS, _RANGE = 800, 1600, 200, 140, 60.0
 #: Orders of a spectrum, and how far it goes beyond the chatter.
 _ORDERS, _BEYOND = 60, 1.3
 #: Highest frequency that a tooling's elements are made for [Hz]; windows of a ring's spectrum [s], and what is shown of it [Hz].
-_HIGHEST_RING, _RING_SECONDS, _RING_BAND = 20e3, 0.25, (250.0, 16e3)
+_HIGHEST_RING, _RING_SECONDS, _RING_BAND = 20e3, 0.25, (250.0, 25e3)
 _UNITS = {Quantity.ACCELERATION: "m/s²", Quantity.DISPLACEMENT: "m", Quantity.FORCE: "N", Quantity.SOUND: "of full scale"}
 
 

@@ -13,7 +13,7 @@ from api.components import Components, ThisService
 from api.conventions import CampaignId, Why, expected, guard, problems, tagged, while_there
 from api.lookups import known_campaign, known_machine
 from api.problems import Problem
-from api.reading.campaigns import anonymous, load_campaign
+from api.reading.campaigns import load_campaign
 from api.routes.toolings import summary
 from api.schemas.learning import LearnAnswer
 from api.schemas.toolings import ToolingKeys
@@ -21,7 +21,7 @@ from api.security import Caller, Guarded, WhoAsks, now
 from api.stores.campaigns import Campaign
 from api.stores.entities import ABSENT, Document, Stale, digest_of
 from api.work.learning import learn
-from api.work.requests import MachineText, TooLong
+from api.work.requests import MachineText, TooLong, anonymous
 from api.work.toolings import parsed
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.toml_text import toml_of

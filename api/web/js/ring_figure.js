@@ -2,8 +2,8 @@
 import { axis, colour, decades } from "./charts.js";
 import { plain } from "./units.js";
 
-/** Decades that are shown below the loudest line, and how far beyond the last line. */
-const [DEPTH, BEYOND] = [4, 1.3];
+/** How far beyond the last line is shown. */
+const BEYOND = 1.3;
 
 export function ringFigure(curve, heard) {
   const vertical = (at, name, dash, width) => ({ type: "line", x0: at, x1: at, y0: 0, y1: 1, yref: "paper", layer: "below", line: { color: colour(name), width, dash } });
@@ -15,6 +15,7 @@ export function ringFigure(curve, heard) {
     .filter((line) => line.is)
     .map((line) => ({ x: line.frequency_hz, y: 1, yref: "paper", yanchor: "bottom", text: line.is, showarrow: false, font: { color: colour("ink") } }));
   const last = curve.frequency_hz.at(-1) ?? 0;
+  const least = curve.amplitude.reduce((low, value) => (value > 0 ? Math.min(low, value) : low), 1);
   return {
     data: [
       {
@@ -32,7 +33,7 @@ export function ringFigure(curve, heard) {
       annotations,
       margin: { l: 56, r: 14, t: 26, b: 44 },
       xaxis: axis("Frequency [Hz]", { tickformat: ",d", showgrid: false, range: [0, Math.min(last, BEYOND * Math.max(...heard.map((line) => line.frequency_hz), last / 4))] }),
-      yaxis: decades("Amplitude [of the loudest]", { range: [-DEPTH, 0.2] }),
+      yaxis: decades("Amplitude [of the loudest]", { range: [Math.log10(least) - 0.2, 0.2] }),
     },
   };
 }

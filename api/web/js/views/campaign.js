@@ -29,7 +29,7 @@ export async function view({ id }, query, place) {
   const list = h("div");
   const hammer = h("div");
   const detail = h("div", { class: "view" });
-  const next = h("div");
+  const next = h("div", { class: "view" });
   const example = knownMachines().some((m) => m.id === campaign.machine && m.example);
   add(
     place,

@@ -61,7 +61,7 @@ function shown(campaign, found) {
   );
   return [
     h("p", null, mark(KINDS[found.status], found.status), ` ${left(found)}`),
-    ...found.toolings.map(toolingTable),
+    ...found.toolings.map((each) => toolingTable(each, found.toolings.length > 1)),
     notes(found),
     some
       ? h(
@@ -75,17 +75,15 @@ function shown(campaign, found) {
   ];
 }
 
-const left = (found) => `${found.model_error.map((share) => `${plain(100 * share, 1)} %`).join(" and ")} of the lines stay unexplained.`;
+const left = (found) => `${found.model_error.map((share) => `${plain(100 * share, 1, 1)} %`).join(" and ")} of the lines stay unexplained.`;
 
-const toolingTable = (each) =>
+const toolingTable = (each, several) =>
   h(
     "div",
     { class: "view" },
+    several ? h("h3", null, each.name) : null,
     each.contradiction ? note("bad", `${each.name} is not taken over: ${each.contradiction}`) : null,
-    table(`${each.name} before and after`, [
-      { name: "Tooling", cell: () => each.name },
-      ...beforeAndAfter("Drawn", (r) => [r.drawn, r.drawn_std], "Found", (r) => [r.found, r.found_std]),
-    ], each.learned),
+    table(`${each.name} before and after`, beforeAndAfter("Drawn", (r) => [r.drawn, r.drawn_std], "Found", (r) => [r.found, r.found_std]), each.learned),
   );
 
 function notes(found) {

@@ -49,7 +49,7 @@ export async function view({ name }, _query, place) {
             [
               { name: "Sound", cell: (each) => each.file.name },
               { name: "Of", cell: (each) => RINGS.find(([field]) => field === each.of)[1].toLowerCase() },
-              { name: "", cell: (each) => h("button", { type: "button", class: "quiet", onclick: () => drop(each), "aria-label": `Leave out ${each.file.name}` }, "Leave out") },
+              { name: "Remove", cell: (each) => h("button", { type: "button", class: "quiet", onclick: () => drop(each), "aria-label": `Leave out ${each.file.name}` }, "Leave out") },
             ],
             sounds,
           )
@@ -119,7 +119,7 @@ export async function view({ name }, _query, place) {
       "section",
       { class: "card" },
       h("h2", null, "What rings"),
-      choices("What rings", RINGS, of, (value) => (of = value)),
+      h("div", null, choices("What rings", RINGS, of, (value) => (of = value))),
     ),
     h("div", { class: "columns" }, matchMedia("(pointer: coarse)").matches ? [recorder, zone] : [zone, recorder]),
     form,
