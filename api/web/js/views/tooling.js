@@ -7,6 +7,7 @@ import { go, holdsEdits, to } from "../router.js";
 import { machine } from "../state.js";
 import { q, text } from "../units.js";
 import { trail } from "./changes.js";
+import { contactCard } from "./contact_card.js";
 import { doubtCard } from "./doubt_card.js";
 import { catalogueBox } from "./holder_catalogue.js";
 import { segmentsTable } from "./segments.js";
@@ -14,12 +15,6 @@ import { SHAPES, START } from "./tooling_start.js";
 
 // of the tool inside the bore, in diameters of its shank: below it no clamping holds; as where the library asks for stickouts
 const LEAST_INSERTION = 1;
-const CONTACT = [
-  ["translational_stiffness", "Translational stiffness", "N/m per m"],
-  ["rotational_stiffness", "Rotational stiffness", "N m/rad per m"],
-  ["translational_damping", "Translational damping", "N s/m per m"],
-  ["rotational_damping", "Rotational damping", "N m s/rad per m"],
-];
 
 export async function view({ name = "" }, query, place) {
   const from = name || query.get("from");
@@ -51,11 +46,7 @@ export async function view({ name = "" }, query, place) {
   const holder = segmentsTable("Holder, from the tool to the flange", "holder.segments", keys.holder.segments, () => changed());
   const taper = h("input", { autocomplete: "off", maxlength: 200 });
   taper.value = keys.holder.taper ?? "";
-  const contact = CONTACT.map(([key, label, unit]) => [
-    key,
-    quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
-  ]);
-
+  const contact = contactCard(keys);
   const doubts = doubtCard(keys);
 
   /** The diameter of the tool where it is clamped. */
@@ -65,7 +56,7 @@ export async function view({ name = "" }, query, place) {
   }
   function takeHolder(found, typical) {
     holder.replace(found.segments);
-    if (typical) for (const [key, box] of contact) box.input.base = typical[key];
+    if (typical) contact.take(typical);
     deep = insertion.input.base = found.insertion_mm;
     reclamp();
     changed();
@@ -138,16 +129,7 @@ export async function view({ name = "" }, query, place) {
       catalogueBox(shank, takeHolder),
       h("div", { class: "fields" }, field("Taper behind the flange", taper, { name: "holder.taper", hint: "As HSK-A63 or BT40: what rings with it on a string", double: true })),
     ),
-    card(
-      "Contact between tool and holder",
-      null,
-      h(
-        "div",
-        { class: "fields" },
-        contact.map(([, box]) => box),
-      ),
-      h("p", { class: "small soft" }, "Per metre of insertion. All four empty: rigid."),
-    ),
+    contact.box,
     doubts.box,
   );
   add(
@@ -200,9 +182,7 @@ export async function view({ name = "" }, query, place) {
         .filter(Boolean)
         .map(Number);
     else delete found.cutter.pitch_deg;
-    delete found.contact;
-    if (contact.some(([, box]) => box.input.base !== null))
-      found.contact = Object.fromEntries(contact.map(([key, box]) => [key, box.input.base]));
+    contact.write(found);
     doubts.write(found);
     if (called.value.trim()) found.name = found.name && name ? found.name : called.value.trim();
     else delete found.name;
