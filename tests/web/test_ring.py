@@ -53,7 +53,7 @@ def learned(page: Page, what: str) -> tuple[float, float, float]:
 def test_the_microphone_hears_the_ring_and_the_tooling_takes_it_over(opened, served: Served, client: Client, rung):
     name = drawn(client, rung, "Rung tool")
     page = opened(f"#/toolings/edit/{name}")
-    expect(page.get_by_label("Taper behind the flange")).to_have_value("HSK-A63")
+    expect(page.get_by_label("Behind the flange")).to_have_value("HSK-A63")
     page.get_by_role("link", name="Ring it").click()
     page.get_by_role("heading", name=f"Ring {name}", level=1).wait_for()
     page.get_by_label("Length").select_option("5")

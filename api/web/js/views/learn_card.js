@@ -4,7 +4,7 @@ import { card, fill, h, mark, note, table, tell, waiting } from "../dom.js";
 import { busy, failed } from "../forms.js";
 import { allMachines, knownMachines } from "../state.js";
 import { plain } from "../units.js";
-import { beforeAndAfter } from "./spreads.js";
+import { beforeAndAfter, OWN } from "./spreads.js";
 
 /** The toolings that a campaign may teach: all that cut are new to an identified machine, and none of their drawings is exact. */
 export function taught(campaign) {
@@ -71,6 +71,7 @@ function shown(campaign, found) {
           found.status === "converged" ? h("label", { class: "check", for: "teach-machine" }, machine, "the machine learns, too: it and these toolings then belong together") : null,
         )
       : null,
+    some ? h("p", { class: "small soft" }, OWN) : null,
     written,
   ];
 }

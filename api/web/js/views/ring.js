@@ -8,7 +8,7 @@ import { go, to } from "../router.js";
 import { ringFigure } from "../ring_figure.js";
 import { plain, quantityInput } from "../units.js";
 import { recorderCard } from "./recorder_card.js";
-import { beforeAndAfter, withSpread } from "./spreads.js";
+import { beforeAndAfter, OWN, withSpread } from "./spreads.js";
 
 /** Parts of the form, and what each is the sound of. */
 const RINGS = [
@@ -144,6 +144,7 @@ function ringAnswer(found, takeOver) {
       found.remarks.length ? note("doubt", ...found.remarks.map(sentence)) : null,
       table("The drawing before and after", beforeAndAfter("Drawn", (r) => [r.before, r.before_std], "Learned", (r) => [r.after, r.after_std]), found.changes),
       h("div", { class: "row-of-buttons" }, button, h("span", { class: "soft" }, "writes a new version of the tooling; the present one stays in its history")),
+      h("p", { class: "small soft" }, OWN),
       fault,
     ),
     ...(found.curves ?? []).map((curve) => spectrumCard(curve, found.heard.filter((line) => line.of === curve.of))),

@@ -25,6 +25,9 @@ const power = (value) => {
   return `${digits}·10${[...String(Number(exponent))].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`;
 };
 
+/** What becomes of the models of a tooling that is taken over. */
+export const OWN = "Taken over, a tooling belongs to no model any more: what is known of its models is in its own numbers.";
+
 /** Columns of a table of numbers of drawings, whose rows tell `what` and `unit`; `old(row)` and `next(row)` are [value, deviation]. */
 export const beforeAndAfter = (before, old, after, next) => [
   { name: "What", cell: (r) => [r.what, h("span", { class: "soft small nowrap" }, ` ${r.unit}`)] },

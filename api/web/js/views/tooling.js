@@ -54,8 +54,9 @@ export async function view({ name = "" }, query, place) {
     const last = tool.rows().at(-1);
     return last.end_diameter_mm ?? last.outer_diameter_mm;
   }
-  function takeHolder(found, typical) {
+  function takeHolder(found, typical, behind) {
     holder.replace(found.segments);
+    taper.value = behind;
     if (typical) contact.take(typical);
     deep = insertion.input.base = found.insertion_mm;
     reclamp();
@@ -127,7 +128,7 @@ export async function view({ name = "" }, query, place) {
       null,
       holder.box,
       catalogueBox(shank, takeHolder),
-      h("div", { class: "fields" }, field("Taper behind the flange", taper, { name: "holder.taper", hint: "As HSK-A63 or BT40: what rings with it on a string", double: true })),
+      h("div", { class: "fields" }, field("Behind the flange", taper, { name: "holder.taper", hint: "HSK-A63, BT40 …: hung on a string, it rings, too", double: true })),
     ),
     contact.box,
     doubts.box,
