@@ -33,6 +33,7 @@ from api.routes import (
     holders,
     identifications,
     keys,
+    learning,
     libraries,
     listening,
     machines,
@@ -40,6 +41,7 @@ from api.routes import (
     multi_upload,
     recordings,
     resumable_upload,
+    ringing,
     schemas,
     static_files,
     streams,
@@ -53,6 +55,7 @@ from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
 from api.schemas.forces import ForceQuery, ForceUpload
 from api.schemas.jobs import PartialLobes
+from api.schemas.ringing import RingQuery
 from api.security import HEADER, WRONG_KEYS
 from api.settings import Settings
 from api.shares import Shares
@@ -136,7 +139,7 @@ def create_app(
     app.include_router(health.router)
     app.include_router(static_files.router)
     about = (keys, usage, machines, toolings, versions, libraries, dropped_files, holders, materials, schemas, examples, example_campaign)
-    taken = (listening, campaigns, recordings, resumable_upload, tus, multi_upload)
+    taken = (listening, ringing, campaigns, recordings, learning, resumable_upload, tus, multi_upload)
     for each in (*about, *taken, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)
@@ -156,7 +159,7 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
         schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         components = schema.setdefault("components", {})
         # bodies that routes parse themselves, what streams of events tell, and the error answer of all routes
-        for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload, PartialLobes):
+        for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload, PartialLobes, RingQuery):
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             components.setdefault("schemas", {}).update(described.pop("$defs", {}))
             components["schemas"][model.__name__] = described

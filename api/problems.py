@@ -32,6 +32,7 @@ _FIELDS = {
     "radial_edge": "cut.kre_n_per_mm",
     "feed_per_tooth": "cut.feed_per_tooth_mm",
     "bore": "bore_mm",
+    "mass": "mass_g",
     "holder length": "length_mm",
 }
 _TITLES = {413: "Content too large", 422: "Input not usable", 460: "Checksum mismatch"}

@@ -11,6 +11,7 @@ import io
 import json
 import tempfile
 import time
+import tomllib
 import wave
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,22 +21,29 @@ import numpy as np
 import tomli_w
 
 from api.client import Client
+from api.routes.ringing import MOST_SOUNDS
 from api.schemas.queries import MOST_SPEEDS, MOST_TESTED, MOST_TOOLINGS
 from api.schemas.toolings import MOST_SEGMENTS
 from api.work.tasks import MOST_LINES
 from benchmarks.hostile import Cost, cost_of
 from benchmarks.service import ask, machine_text, new_tooling, serving
 from benchmarks.uploads import SAMPLES, campaign_of, recording
+from rcsa_ident.io.setups import tooling_of
+from rcsa_ident.tool_holder.free_modes import bending_modes
+from rcsa_ident.tool_holder.taper import hung
 
 _BINARY = {"Content-Type": "application/octet-stream"}
 _JSON = {"Content-Type": "application/json"}
 _TUS = {"Tus-Resumable": "1.0.0"}
+_FORM = {"Content-Type": "multipart/form-data; boundary=x"}
 _PAGE = 200
 #: Routes that cost less are counted alone [s].
 SLIGHT = 0.05
 _LISTS = ("machines", "toolings", "changes", "recordings", "campaigns", "identifications", "keys")
 #: Segments of tool and of holder in what is computed: two elements each, and 400 may be computed with.
 _COMPUTED = 95
+#: Cuts of a campaign whose tooling is new to the machine: one or three are enough.
+CUTS_OF_NEW = 40
 #: A recording of the sample campaign.
 CUT = "S1-ER32-00_cut.h5"
 
@@ -52,7 +60,8 @@ class Ask(NamedTuple):
 class Shop(NamedTuple):
     """What the service holds.
 
-    Ids of a machine, a campaign of 160 recordings, jobs of an identification and of lobes, a key, a campaign of large recordings, and one.
+    Ids of a machine, a campaign of 160 recordings, jobs of an identification and of lobes, a key, a campaign of large recordings, and one,
+    and a campaign of a tooling that is new to the machine.
     """
 
     machine: str
@@ -62,6 +71,7 @@ class Shop(NamedTuple):
     key: str
     large: str
     raw: bytes
+    new: str
 
 
 def table(only: str) -> None:
@@ -129,7 +139,21 @@ def _shop(port: int, folder: Path) -> Shop:
         if told.answer is None:
             raise RuntimeError(told.job.problem)
         key = client.send("POST", "/keys", json={"scopes": ["read"]}).json()["id"]
-    return Shop(machine, campaign, job, lobes, key, large, raw)
+        new = _new_tool(client, machine)
+    return Shop(machine, campaign, job, lobes, key, large, raw, new)
+
+
+def _new_tool(client: Client, machine: str) -> str:
+    """A campaign of cuts with one tooling, whose drawing is not exact."""
+    data = tomllib.loads((SAMPLES / "campaign.toml").read_text(encoding="utf-8"))
+    name = data["cuts"][0]["tooling"]
+    keys = tomllib.loads((SAMPLES / data["toolings"][name]).read_text(encoding="utf-8")) | {"spread": {}}
+    cuts = [cut for cut in data["cuts"] if cut["tooling"] == name][:CUTS_OF_NEW]
+    campaign = client.make_campaign(machine, data | {"toolings": {name: keys}, "cuts": cuts}).id
+    for cut in cuts:
+        for kind in ("air", "cut"):
+            client.upload(campaign, SAMPLES / cut[kind])
+    return campaign
 
 
 def _full(seed: int = 0, parts: int = MOST_SEGMENTS) -> dict[str, Any]:
@@ -223,6 +247,9 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
         named = {"campaign.toml": cuts(count)} | {f"T{k}.toml": new_tooling(k) for k in range(199)}
         return "/v1/campaigns/preview", {"files": [{"name": name, "text": tomli_w.dumps(keys)} for name, keys in named.items()]}
 
+    def learning(path: str) -> list[Iterator[Ask]]:
+        return [iter([Ask(f"{CUTS_OF_NEW} cuts of a new tooling", f"/v1/campaigns/{shop.new}/{path}", {})])]
+
     def plain(path: str, body: Any) -> list[Iterator[Ask]]:
         return [iter([Ask("", path, _JSON, json.dumps(body).encode())])]
 
@@ -248,6 +275,9 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
         "POST /toolings/import": [_halved("{} tools of a CAM library", 8192, library)],
         "POST /listen": [iter([Ask("a minute of sound at 48 kHz", "/v1/listen", {"Content-Type": "audio/wav"}, _sound())])],
         "POST /tap": [iter([Ask("20 hits in 20 s at 25.6 kHz", "/v1/tap", {"Content-Type": "text/csv"}, _hits())])],
+        "POST /ring": [_halved("{} sounds of ten hits in 10 s at 48 kHz", MOST_SOUNDS, _rings, _FORM)],
+        "POST /campaigns/{id}/learn": learning("learn"),
+        "POST /campaigns/{id}/learn/take-over": learning("learn/take-over?machine=true"),
         "POST /campaigns/preview": [_halved("200 files, a campaign of {} cuts", 2000, dropped)],
         "POST /tested-cuts/preview": [
             iter([Ask(f"{MOST_TESTED} cuts", "/v1/tested-cuts/preview", {"Content-Type": "text/csv"}, tests.encode())])
@@ -259,7 +289,7 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
         "PATCH /campaigns/{id}/recordings/{name}": frames(
             f"{recordings}/c2.h5", _varied(shop.raw, 2), **{"Upload-Offset": "0", "Upload-Length": length}
         ),
-        "POST /campaigns/{id}/recordings": [iter([Ask(large, recordings, {"Content-Type": "multipart/form-data; boundary=x"}, form)])],
+        "POST /campaigns/{id}/recordings": [iter([Ask(large, recordings, _FORM, form)])],
         "HEAD /campaigns/{id}/recordings/{name}": [iter([Ask(large, f"{recordings}/c0.h5", {})])],
         "GET /campaigns/{id}/recordings/{name}/file": [iter([Ask(large, f"{recordings}/c0.h5/file", {})])],
         "GET /campaigns/{id}/recordings/{name}/spectrum": [iter([Ask(large, f"{recordings}/c0.h5/spectrum?points=10000", {})])],
@@ -287,6 +317,28 @@ def _sound() -> bytes:
         sound.setframerate(48_000)
         sound.writeframes((8000.0 * heard / np.abs(heard).max()).astype("<i2").tobytes())
     return file.getvalue()
+
+
+def _rings(count: int) -> tuple[str, bytes]:
+    """A form of a tooling and so many sounds of its first two modes."""
+    keys = new_tooling(0) | {"spread": {}}
+    modes = bending_modes(hung(tooling_of(keys, "", "rung").assembly, ""), 2, 12e3)
+    rate, rng = 48_000.0, np.random.default_rng(1)
+    after = np.arange(int(10.0 * rate)) / rate % 1.0 - 0.1
+    heard = 3e-3 * rng.standard_normal(after.size)
+    for mode in modes:
+        decay = np.exp(-(mode.damping or 0.01) * mode.omega * np.maximum(after, 0.0)) * np.sin(mode.omega * after)
+        heard += np.where(after > 0.0, decay / mode.order, 0.0)
+    file = io.BytesIO()
+    with wave.open(file, "wb") as sound:
+        sound.setnchannels(1)
+        sound.setsampwidth(2)
+        sound.setframerate(int(rate))
+        sound.writeframes((16_000.0 * heard / np.abs(heard).max()).astype("<i2").tobytes())
+    parts = [b'--x\r\nContent-Disposition: form-data; name="query"\r\n\r\n' + json.dumps({"tooling": keys, "curves": True}).encode()]
+    for k in range(count):
+        parts.append(b'--x\r\nContent-Disposition: form-data; name="sounds"; filename="%d.wav"\r\n\r\n' % k + file.getvalue())
+    return "/v1/ring", b"\r\n".join(parts) + b"\r\n--x--\r\n"
 
 
 def _hits() -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -19,11 +19,13 @@ from api.schemas.dropped_files import DroppedAnswer, TestedCutsAnswer
 from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
 from api.schemas.holders import CatalogueAnswer, Holders
 from api.schemas.keys import KeyAnswer, MadeKey
+from api.schemas.learning import LearnAnswer
 from api.schemas.libraries import Example, ExampleCampaign, Examples, ImportAnswer
 from api.schemas.listening import ListenAnswer, TapAnswer
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
 from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
+from api.schemas.ringing import RingAnswer
 from api.schemas.toolings import ToolingAnswer, ToolingSummary
 from api.schemas.usage import Usage
 from api.schemas.versions import ChangeAnswer, Differences, ToolingVersion
@@ -173,6 +175,24 @@ class Client(Uploads, Jobs):
         with ExitStack() as opened:
             files = [("hits", (path.name, opened.enter_context(path.open("rb")))) for path in hits]
             return self.send("POST", "/tap", files=files, params=_query(further), headers={"Accept": kind}, **self.long_timeout)
+
+    def ring(self, tooling: str | Json, *sounds: Path, bare_tool: Sequence[Path] = (), **further: Any) -> RingAnswer:
+        """Return what the ring of a tooling tells of it, by its name or its keys; options mass_g, rate_hz, curves."""
+        with ExitStack() as opened:
+            named = [*(("sounds", path) for path in sounds), *(("bare_tool", path) for path in bare_tool)]
+            files = [(field, (path.name, opened.enter_context(path.open("rb")))) for field, path in named]
+            query = ("query", (None, json.dumps({"tooling": tooling, **further})))
+            return read(RingAnswer, self.send("POST", "/ring", files=[query, *files], **self.long_timeout))
+
+    def learn(self, campaign: str) -> LearnAnswer:
+        """Return what the cuts of a campaign teach of toolings that are new to its machine; nothing is stored."""
+        return read(LearnAnswer, self.send("POST", f"/campaigns/{campaign}/learn", **self.long_timeout))
+
+    def take_over(self, campaign: str, machine: bool = False, seen: str | None = None, why: str = "") -> LearnAnswer:
+        """Write the toolings that a campaign's cuts teach, with `machine` the machine, too; `seen` is the etag of what `learn` answered."""
+        params = {"machine": str(machine).lower(), "why": why}
+        path = f"/campaigns/{campaign}/learn/take-over"
+        return read(LearnAnswer, self.send("POST", path, params=params, headers=match(seen), **self.long_timeout))
 
     def schema(self, name: str) -> Json:
         """Return the JSON Schema of a TOML file: tooling, campaign, machine or modes."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from api.stores.entities import digest_of, whole
 from api.stores.jobs import Applied, Job, Outcome
 from api.work import tasks
 from api.work.machine_cache import starts
+from api.work.requests import anonymous
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
@@ -37,8 +38,6 @@ from rcsa_ident.workflows.identify import ReadCut, ReadTest, data_of, hammer_lin
 
 #: Returns a campaign of a group, what reads its cuts and what reads its hammer tests.
 Load = Callable[[str, str], tuple[Campaign, ReadCut, ReadTest]]
-_T = TypeVar("_T")
-_R = TypeVar("_R")
 #: Cuts that are judged in one step, and points of a curve.
 CHUNK, POINTS = 4, 300
 
@@ -65,7 +64,7 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     plan = context.remember("plan", lambda: [_files(each) for each in _parts(campaign)])
     campaign = _planned(campaign, plan)
     readings = _readings(campaign, read, context)
-    data = data_of(campaign, readings, hammer_lines(campaign, _anonymous(read_test)))
+    data = data_of(campaign, readings, hammer_lines(campaign, partial(anonymous, read_test)))
     story = _Story(context, Preview(data), datetime.fromisoformat(str(job.started)))
     found = of_campaign(_method(request["method"], start).run(data, request["seed"], _Remembering(context, spread), story), campaign)
     context.progress("result", 0, 1)
@@ -113,7 +112,7 @@ def _planned(campaign: Campaign, plan: list[list[str]]) -> Campaign:
 def _readings(campaign: Campaign, read: ReadCut, context: JobContext) -> list[Reading]:
     def reading(cut: Cut) -> Reading:
         context.check()
-        return judge_cut(campaign, _anonymous(read), cut)
+        return judge_cut(campaign, partial(anonymous, read), cut)
 
     readings: list[Reading] = []
     for first in range(0, len(campaign.cuts), CHUNK):
@@ -122,18 +121,6 @@ def _readings(campaign: Campaign, read: ReadCut, context: JobContext) -> list[Re
         readings += context.remember(f"recordings.{first}", partial(_all, reading, cuts))
     context.progress("recordings", len(campaign.cuts), len(campaign.cuts))
     return among_fellows(readings)
-
-
-def _anonymous(read: Callable[[_T], _R]) -> Callable[[_T], _R]:
-    """What reads the same, but does not tell where the service keeps its files."""
-
-    def reading(each: _T) -> _R:
-        try:
-            return read(each)
-        except InputError as error:
-            raise InputError(error.field, error.found, error.allowed) from None
-
-    return reading
 
 
 def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading]:

@@ -1,4 +1,4 @@
-"""What a recording says, and hits of a hammer as an FRF, in the reader process: answers are plain JSON types, curves have few points."""
+"""What a recording says, hits of a hammer as an FRF, rings as a tooling, in the reader process: plain JSON types, few points a curve."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ import numpy as np
 
 from api.reading.campaign_text import Upload
 from api.reading.examine import with_client_name
+from api.work.requests import ToolingSource
+from api.work.toolings import keys_of, parsed, tooling_from, weigh
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.exports import write_tap
 from rcsa_ident.io.open_recording import open_recording
 from rcsa_ident.io.told_tables import OpenRecording
+from rcsa_ident.report.ring_rows import ring_row
 from rcsa_ident.report.summaries import listening_row, tap_row
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Quantity
@@ -22,12 +25,15 @@ from rcsa_ident.signals.spectra import envelope, mean_spectrum, spectrogram
 from rcsa_ident.signals.tap import HitEstimator, TapFrf
 from rcsa_ident.units import from_rpm, to_hz
 from rcsa_ident.workflows.listen import listen_to
+from rcsa_ident.workflows.ring import ring_tooling
 from rcsa_ident.workflows.tap import tap_recordings
 
 #: Points of the signal and of a spectrum, columns and rows of the spectrogram, and the decibels that it shows.
 _POINTS, _LINES, _COLUMNS, _ROWS, _RANGE = 800, 1600, 200, 140, 60.0
 #: Orders of a spectrum, and how far it goes beyond the chatter.
 _ORDERS, _BEYOND = 60, 1.3
+#: Highest frequency that a tooling's elements are made for [Hz]; windows of a ring's spectrum [s], and what is shown of it [Hz].
+_HIGHEST_RING, _RING_SECONDS, _RING_BAND = 20e3, 0.25, (250.0, 25e3)
 _UNITS = {Quantity.ACCELERATION: "m/s²", Quantity.DISPLACEMENT: "m", Quantity.FORCE: "N", Quantity.SOUND: "of full scale"}
 
 
@@ -76,6 +82,40 @@ def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:
         finally:
             made.unlink(missing_ok=True)
     return tap_row(found, [hit.name for hit in hits], remarks) | _receptance(found)
+
+
+def ring(tooling: ToolingSource, asked: Mapping[str, Any], *paths: Path) -> dict[str, Any]:
+    """Return what the ring of a tooling tells of it, as `rcsa-ident ring --json` does, and the tooling that it teaches.
+
+    Parameters
+    ----------
+    tooling : ToolingSource
+    asked : mapping
+        mass_g, rate_hz and curves of the query; names of the files in `sounds` and `bare_tool`.
+    *paths : Path
+        Their files, in this order.
+    """
+    drawn = tooling_from(tooling)
+    weigh(drawn.assembly, _HIGHEST_RING)
+    names = [*asked["sounds"], *asked["bare_tool"]]
+    opened = [_opened(path, name, (), asked["rate_hz"]) for path, name in zip(paths, names, strict=True)]
+    sounds, alone = opened[: len(asked["sounds"])], opened[len(asked["sounds"]) :]
+    found = ring_tooling(drawn, sounds, alone, None if asked["mass_g"] is None else 1e-3 * asked["mass_g"])
+    curves = [_ring_spectrum(of, each) for of, each in (("tooling", sounds), ("tool alone", alone)) if each] if asked["curves"] else None
+    # the file's own name stays what it was, whatever the library calls it
+    own = (parsed(tooling.text) if tooling.keys is None else tooling.keys).get("name")
+    learned = keys_of(found.after) | ({} if own is None else {"name": own})
+    return ring_row(found) | {"learned": learned, "curves": curves}
+
+
+def _ring_spectrum(of: str, sounds: Sequence[OpenRecording]) -> dict[str, Any]:
+    """The mean spectrum of the longest sound; short windows, since what rings is soon over."""
+    longest = max(sounds, key=lambda each: each.channels[0].samples.size / each.rate)
+    frequency, amplitude = mean_spectrum(np.nan_to_num(longest.channels[0].samples), longest.rate, _RING_SECONDS)
+    shown = (frequency > _RING_BAND[0]) & (frequency < _RING_BAND[1])
+    kept = _highest(amplitude[shown], _LINES)
+    largest = float(amplitude[shown].max(initial=0.0)) or 1.0
+    return {"of": of, "frequency_hz": _short(frequency[shown][kept], 7), "amplitude": _short(amplitude[shown][kept] / largest)}
 
 
 def _opened(path: Path, name: str, names: Sequence[str], rate: float | None) -> OpenRecording:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from api.reading.campaign_text import Upload
+from api.work.requests import ToolingSource
 from rcsa_ident.signals.recording import Sensor
 
 
@@ -50,6 +51,13 @@ def tap(asked: dict[str, Any], *hits: Upload) -> dict[str, Any]:
     from api.reading import hearing
 
     return hearing.tap(asked, *hits)
+
+
+def ring(tooling: ToolingSource, asked: dict[str, Any], *sounds: Path) -> dict[str, Any]:
+    """Return what the ring of a tooling tells of it, see `hearing.ring`."""
+    from api.reading import hearing
+
+    return hearing.ring(tooling, asked, *sounds)
 
 
 def recording_and_air(cut: Path, air: Path | None) -> tuple[Any, Any]:

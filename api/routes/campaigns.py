@@ -166,6 +166,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
     rows = {row.name: row for row in components.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
     tests = [_hammer_test(test, rows) for test in data.get("frfs", ())]
+    remarks, rough = _told(campaign)
     usable = [(cut.tooling, cut.verdict.windows) for cut in cuts if cut.verdict is not None and cut.verdict.usable]
     return CampaignAnswer(
         id=campaign.id,
@@ -177,7 +178,8 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         workpiece=data.get("workpiece", {}),
         toolings=list(data["toolings"]),
         usable=len(usable),
-        remarks=_remarks(campaign),
+        remarks=remarks,
+        rough_toolings=rough,
         # hammer tests help, and tell by their spreads what they leave open
         too_few=None if tests else too_few((tooling for tooling, windows in usable for _ in range(windows)), _sees_flange(data["sensors"])),
         cuts=cuts,
@@ -190,12 +192,14 @@ def _sees_flange(sensors: dict[str, dict[str, Any]]) -> bool:
     return not sensors or any(sensor["quantity"] == "displacement" for sensor in sensors.values())
 
 
-def _remarks(campaign: Campaign) -> list[str]:
+def _told(campaign: Campaign) -> tuple[list[str], list[str]]:
+    """Remarks on a campaign, and its toolings whose drawings are not exact."""
     try:
-        return list(campaign_of_text(campaign.text).remarks)
+        found = campaign_of_text(campaign.text)
     except InputError as error:
         # accepted by an earlier release, which knew fewer limits
-        return [str(error)]
+        return [str(error)], []
+    return list(found.remarks), [name for name, tooling in found.toolings.items() if not tooling.spread.exact]
 
 
 def _verdict(row: Recording) -> dict[str, Any]:

@@ -141,15 +141,16 @@ async def _files(
             async with form(request, components, group, (), (field,), several=most > 1) as (_, parts):
                 if not 1 <= len(parts) <= most:
                     raise InputError(field, f"{len(parts)} of them", f"1 to {most} files")
-                yield [(_checked(file), received) for file, received in parts.values()]
+                yield [(checked_name(file), received) for file, received in parts.values()]
             return
-        file = _checked(recording_name(name) if name else f"recording{_KINDS.get(kind, '')}")
+        file = checked_name(recording_name(name) if name else f"recording{_KINDS.get(kind, '')}")
         async with new_part(components, group) as part:
             await append(request, components, group, part)
             yield [(file, await complete(part))]
 
 
-def _checked(name: str) -> str:
+def checked_name(name: str, field: str = "name") -> str:
+    """Return the name of a recording whose suffix is a known format."""
     if PurePosixPath(name).suffix.lower() not in _FORMATS:
-        raise InputError("name", name[-80:] or "nothing", f"the name of a file that ends in one of {', '.join(_FORMATS)}")
+        raise InputError(field, name[-80:] or "nothing", f"the name of a file that ends in one of {', '.join(_FORMATS)}")
     return name

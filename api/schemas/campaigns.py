@@ -224,6 +224,7 @@ class CampaignAnswer(Answer):
     sensors: dict[str, dict[str, Any]]
     workpiece: dict[str, Any] = Field(description="Empty where hammer tests alone tell none.")
     toolings: list[str]
+    rough_toolings: list[str] = Field([], description="Those whose drawings are not exact: cuts teach them.")
     usable: int = Field(description="Number of cuts that an identification would use.")
     remarks: list[str] = Field(description="What is unusual about its toolings, its workpiece and its cuts.")
     too_few: str | None = Field(description="What is missing, where these are too few for an identification that can be relied on.")

@@ -37,6 +37,8 @@ class IdentificationSummary(Answer):
     campaign: str
     axes: list[str]
     band_hz: list[float]
+    toolings: list[str] = Field([], description="That it was identified with.")
+    taught_by: list[str] = Field([], description="Campaigns of further toolings that have taught the machine, too.")
     changed: str
     etag: str
 

@@ -20,7 +20,7 @@ from rcsa_ident.machine.machine import LOWEST, Machine
 from rcsa_ident.units import from_hz, to_hz
 
 #: What the service takes; the largest campaigns stay far below.
-HIGHEST_HZ, MOST_MODES, MOST_UNKNOWNS, MOST_RIVALS, MOST_BANDS = 20_000.0, 60, 600, 20, 20
+HIGHEST_HZ, MOST_MODES, MOST_UNKNOWNS, MOST_RIVALS, MOST_BANDS, MOST_TOLD = 20_000.0, 60, 600, 20, 20, 200
 
 
 class MachineCache:
@@ -134,6 +134,7 @@ def _limits(data: dict[str, Any]) -> None:
         raise InputError("band_hz", f"up to {data['band_hz'][1]:g} Hz", f"at most {HIGHEST_HZ:g} Hz")
     bands = data.get("speed_bands") or []
     _at_most("speed_bands", bands, MOST_BANDS)
+    _at_most("taught_by", data.get("taught_by", []), MOST_TOLD)
     for table in (data, *bands):
         named = {f"axes.{name}": axis for name, axis in table["axes"].items()}
         named |= {"both_planes": table["both_planes"]} if isinstance(table.get("both_planes"), dict) else {}

@@ -28,6 +28,8 @@ MOST_LINES = 20_000
 
 _MODE = ("natural_frequency_hz", "natural_frequency_std_hz", "damping_ratio", "damping_ratio_std", "phi_t", "phi_r")
 _WHOLE_MODE = (*_MODE[:4], "direction_deg", "phi")
+#: What a measured flange does not tell.
+_UNTOLD: dict[str, Any] = {"toolings": [], "taught_by": []}
 _ALLOWED = "at most {:g} s (fewer of them, no bands, zero-order)"
 
 _machines = MachineCache(4)
@@ -49,7 +51,7 @@ def check(text: str) -> dict[str, Any]:
     machine = read(text)
     assert machine.band is not None
     axes = sorted(axis.upper() for axis in machine.axes)
-    return {"status": "measured", "reasons": [], "campaign": "", "axes": axes, "band_hz": [to_hz(w) for w in machine.band]}
+    return {"status": "measured", "reasons": [], "campaign": "", "axes": axes, "band_hz": [to_hz(w) for w in machine.band]} | _UNTOLD
 
 
 def summary_of(data: dict[str, Any]) -> dict[str, Any]:
@@ -60,6 +62,8 @@ def summary_of(data: dict[str, Any]) -> dict[str, Any]:
         "campaign": data["campaign"]["name"],
         "axes": sorted(data["axes"]),
         "band_hz": data["band_hz"],
+        "toolings": sorted({name for axis in data["axes"].values() for name in axis.get("misfit", {}).get("per_tooling", ())}),
+        "taught_by": data.get("taught_by", []),
     }
 
 

@@ -10,6 +10,7 @@ from api.work.requests import ToolingSource
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import setups
 from rcsa_ident.io.toml_text import keys_of_toml
+from rcsa_ident.io.toolings import tooling_keys, tooling_text
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import expected_elements
@@ -34,6 +35,11 @@ def tooling_from(source: ToolingSource) -> Tooling:
 def parsed(text: str) -> dict[str, Any]:
     """Return the keys of a TOML text."""
     return keys_of_toml(text, "tooling")
+
+
+def keys_of(tooling: Tooling) -> dict[str, Any]:
+    """Return the keys of a tooling, to the last digit as its file would have them."""
+    return parsed(tooling_text(tooling_keys(tooling)))
 
 
 def weigh(assembly: ToolAssembly, highest_hz: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,8 +53,7 @@ def learn_from_campaign(
     for each in found.toolings:
         if each.drawn.name in written:
             write_tooling(written[each.drawn.name], each.tooling)
-    good = len(written) == len(found.toolings) and found.converged
-    if machine is not None and good:
+    if machine is not None and found.good:
         write_result(machine, taught_result(data, found.machine, campaign.name))
     if json_:
         emit(_told(found, {name: str(path) for name, path in written.items()}) | {"seconds": stages.seconds})
@@ -64,9 +62,9 @@ def learn_from_campaign(
         for cut, reason in left_out(readings):
             warn(f"{cut} left out: {reason}")
         tell(known, result)
-        if machine is not None and good:
+        if machine is not None and found.good:
             say(f"written: {machine}; its tips are those of the toolings in {toolings}")
-    if not good:
+    if not found.good:
         raise typer.Exit(NOT_CONVERGED)
 
 
@@ -78,19 +76,10 @@ def _free(path: Path, overwrite: bool, option: str) -> None:
 
 def _told(found: LearntToolings, written: dict[str, str]) -> dict[str, Any]:
     """What is printed for machines."""
-    from rcsa_ident.workflows.learn_toolings import told
+    from rcsa_ident.workflows.learn_toolings import learnt_row
 
-    toolings = [
-        {
-            "name": each.drawn.name,
-            "file": written.get(each.drawn.name),
-            "contradiction": each.contradiction,
-            "learned": [asdict(row) for row in told(each)],
-        }
-        for each in found.toolings
-    ]
-    status = "converged" if found.converged and len(written) == len(toolings) else "suspect" if found.converged else "not-converged"
-    return {"status": status, "toolings": toolings, "model_error": list(found.model_error), "notes": list(found.notes)}
+    row = learnt_row(found)
+    return row | {"toolings": [each | {"file": written.get(each["name"])} for each in row["toolings"]]}
 
 
 def _show(found: LearntToolings, written: dict[str, str]) -> None:

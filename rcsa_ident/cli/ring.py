@@ -33,7 +33,7 @@ def ring(
     from rcsa_ident.io.open_recording import open_recording
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.io.toolings import tooling_keys, tooling_text, write_text
-    from rcsa_ident.report.ringing import ring_row, sentences
+    from rcsa_ident.report.ring_rows import ring_row, sentences
     from rcsa_ident.workflows.ring import ring_tooling
 
     writable(out)

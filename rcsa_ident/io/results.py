@@ -150,8 +150,9 @@ def check_result(data: Any, where: str) -> None:
     # hammer tests alone cut nothing
     if "workpiece" in top or top.table("campaign").data.get("cuts_used") != 0:
         workpiece_of(top.table("workpiece"))
-    if "notes" in top:
-        _texts(top, "notes")
+    for key in ("notes", "taught_by"):
+        if key in top:
+            _texts(top, key)
     low, high = top.numbers("band_hz", 2, "Hz")
     if not 0.0 <= low < high:
         top.refuse("band_hz", [low, high], "lower and upper end, 0 <= lower < upper [Hz]")

@@ -40,6 +40,8 @@ _WINDOWS, _WHOLE = (2e-3, 2.5e-3, 3.2e-3, 5e-3, 8e-3, 12e-3, 20e-3, 40e-3, 80e-3
 _BAND, _PEAKS = 600.0, 6
 #: Orders of the subspace: of the whole signal, and of a band.
 _ORDERS, _ZOOMED = (8, 12, 16, 20, 24), (2, 3, 4, 6)
+#: Hits that are listened to, of more the loudest: what a further one adds is less than a second of computing is worth.
+_MOST_HITS = 12
 #: Decays over a window's length between which a pole is told by it: where a ring has died, reflections are what is left.
 _SHORT, _LONG = 0.7, 3.0
 #: Share of a ring's energy that has to be over after half of it: what rings dies away, what speaks or hums goes on.
@@ -105,7 +107,7 @@ class RingDown:
     modes : tuple of RingingMode
         In ascending order of frequency.
     hits : int
-        That were used.
+        That were used, at most 12.
     steady : tuple of float [rad/s]
         Tones that do not decay: hum, fans, whistles.
     damping_doubt : str
@@ -176,6 +178,7 @@ def ring_down(recordings: Sequence[tuple[float, FloatArray]], lossy: bool = Fals
         rings += _rings(sound, rate, loudness, loudest)
     if not rings:
         raise InputError("recording", "no hit", "a quiet moment, a hit, and what rings after it")
+    rings = sorted(rings, key=lambda ring: -float(np.max(np.abs(ring.samples))))[:_MOST_HITS]
     highest = _HEARD * min(rate for rate, _ in recordings)
     steady = _steady_tones(rings, highest)
     modes = tuple(mode for mode in _combined(rings, highest) if not _is_steady(mode, steady))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -111,6 +112,11 @@ class LearntToolings:
     converged: bool
     notes: tuple[str, ...] = ()
 
+    @property
+    def good(self) -> bool:
+        """Whether nothing speaks against it."""
+        return self.converged and not any(each.contradiction for each in self.toolings)
+
 
 def learn_toolings(machine: IdentifiedMachine, campaign: Campaign, readings: Sequence[Reading]) -> LearntToolings:
     """Return what the usable cuts of a campaign tell of its toolings, on a machine that earlier cuts have told.
@@ -209,6 +215,16 @@ def _taught(machine: IdentifiedMachine, known: KnownMachine) -> IdentifiedMachin
 def told(learnt: LearntTooling) -> list[Learnt]:
     """Return what was learned of each number that a drawing leaves open, in the drawing's terms and units."""
     return [_row(learnt, field) for field in ALTERATIONS if getattr(learnt.before, field) > 0.0]
+
+
+def learnt_row(found: LearntToolings) -> dict[str, Any]:
+    """Return what further cuts have told as commands and service tell it, in the drawings' terms."""
+    toolings = [
+        {"name": each.drawn.name, "contradiction": each.contradiction, "learned": [asdict(row) for row in told(each)]}
+        for each in found.toolings
+    ]
+    status = "converged" if found.good else "suspect" if found.converged else "not-converged"
+    return {"status": status, "toolings": toolings, "model_error": list(found.model_error), "notes": list(found.notes)}
 
 
 def _row(learnt: LearntTooling, field: str) -> Learnt:

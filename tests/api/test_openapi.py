@@ -20,6 +20,7 @@ from api.schemas.campaigns import NewCampaign
 from api.schemas.forces import ForceQuery, ForceUpload
 from api.schemas.jobs import NewIdentification
 from api.schemas.queries import AdviceQuery, LobeQuery, TipQuery
+from api.schemas.ringing import RingQuery
 from api.schemas.toolings import ToolingKeys
 from api.security import new_id, now
 from api.stores.jobs import Event, Job, Outcome
@@ -75,7 +76,9 @@ def test_references_lead_somewhere(http):
     walk(schema)
 
 
-@pytest.mark.parametrize("model", [ToolingKeys, NewCampaign, NewIdentification, TipQuery, LobeQuery, AdviceQuery, ForceUpload, ForceQuery])
+@pytest.mark.parametrize(
+    "model", [ToolingKeys, NewCampaign, NewIdentification, TipQuery, LobeQuery, AdviceQuery, ForceUpload, ForceQuery, RingQuery]
+)
 def test_examples_are_what_they_show(model):
     for shown in model.model_json_schema()["examples"]:
         model.model_validate_json(json.dumps(shown))

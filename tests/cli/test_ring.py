@@ -4,44 +4,24 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
 import soundfile
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.io.toolings import write_tooling
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.tool_holder.free_modes import bare, bending_modes
-from rcsa_ident.tool_holder.taper import hung
-from rcsa_ident.tool_holder.timoshenko import hutchinson
-from rcsa_ident.units import to_hz
-from tests.identification.test_ringing import TRUE, altered, drawn
-from tests.signals.test_ring_down import RATE, hits
+from tests.fixtures.rung_tooling import rung_tooling
 
 
 def run(*arguments):
     return CliRunner().invoke(app, [str(each) for each in arguments])
 
 
-def written(path, body):
-    modes = [(to_hz(mode.omega), mode.damping, 1.0 / mode.order) for mode in bending_modes(body, 2, 20e3, hutchinson)]
-    sound = hits(modes, noise=3e-4)
-    soundfile.write(path, 0.5 * sound / np.max(np.abs(sound)), int(RATE), subtype="PCM_16")
-    return path
-
-
 @pytest.fixture(scope="module")
 def rung(tmp_path_factory):
-    """A drawing, the sound of what truly hangs there, and that of the tool alone."""
     folder = tmp_path_factory.mktemp("ring")
-    tooling = drawn()
-    write_tooling(folder / "DRAWN.toml", tooling)
-    true = altered(tooling.assembly, TRUE)
-    written(folder / "whole.wav", hung(true, "HSK-A63"))
-    written(folder / "tool.wav", bare(true.tool))
-    return folder, 1e3 * sum(segment.mass for segment in true.tool), true
+    return folder, *rung_tooling(folder)
 
 
 def test_a_drawing_is_corrected(rung):

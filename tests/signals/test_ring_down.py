@@ -48,6 +48,13 @@ def log_decrement(signal, frequency):
     return -slope / (2.0 * np.pi * frequency)
 
 
+def test_of_many_hits_the_loudest_are_enough():
+    """A minute of taps costs no more than a dozen."""
+    found = ring_down([(RATE, hits([(1855.0, 0.039, 1.0)], count=15))])
+    assert found.hits == 12
+    assert to_hz(found.modes[0].omega) == pytest.approx(1855.0, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("modes", "frequency_error", "damping_error"),
     [

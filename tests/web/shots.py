@@ -47,6 +47,7 @@ def views(machine: str, campaign: str, job: str) -> dict[str, str]:
         "identification": f"#/identifications/{job}",
         "toolings": "#/toolings",
         "tooling": "#/toolings/edit/Example S3-PG25-long",
+        "ring": "#/toolings/ring/Example S3-PG25-long",
         "new_tooling": "#/toolings/new",
         "changes": "#/changes",
         "change": f"#/change?machine={machine}&tooling=Example S4-shrink",
@@ -91,7 +92,7 @@ def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable
         dropped(page, folder, "S9-shop")
 
     def exact(page: Page) -> None:
-        page.get_by_label("Method").select_option("full-discretisation")
+        page.get_by_label("Method", exact=True).select_option("full-discretisation")
         page.wait_for_timeout(1500)
 
     return {

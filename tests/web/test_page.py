@@ -319,6 +319,8 @@ def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, clie
     expect(page.get_by_role("heading", name="T1-catalogue")).to_be_visible()
     made, kept = client.holder("HSK-A63", "ER32", 12.0), client.tooling("T1-catalogue").tooling
     assert kept.holder.segments == made.holder.segments
+    # what a ring hears behind its flange
+    assert kept.holder.taper == "HSK-A63"
     assert kept.contact == made.contact.keys
     client.forget_tooling("T1-catalogue")
     # what the chuck does not take is said in its words

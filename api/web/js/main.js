@@ -35,6 +35,7 @@ route("identifications/:id", "identification", view("identification"));
 route("toolings", "toolings", view("toolings"));
 route("toolings/new", "toolings", view("tooling"));
 route("toolings/edit/:name", "toolings", view("tooling"));
+route("toolings/ring/:name", "toolings", view("ring"));
 route("changes", "toolings", view("changes"));
 route("change", "change", ofMachine(view("change")));
 route("card", "change", view("tool_card"));

@@ -9,6 +9,7 @@ import { knownMachines } from "../state.js";
 import { namedFiles, queueFor } from "../uploads.js";
 import { text } from "../units.js";
 import { identifyCard } from "./identify_card.js";
+import { learnCard, taught } from "./learn_card.js";
 import { recordingPanel } from "./recording.js";
 import { hammerTable, stateOf, verdictTable } from "./verdicts.js";
 
@@ -28,7 +29,7 @@ export async function view({ id }, query, place) {
   const list = h("div");
   const hammer = h("div");
   const detail = h("div", { class: "view" });
-  const next = h("div");
+  const next = h("div", { class: "view" });
   const example = knownMachines().some((m) => m.id === campaign.machine && m.example);
   add(
     place,
@@ -166,11 +167,12 @@ export async function view({ id }, query, place) {
     const made = example ? filling(campaign) : null;
     const tested = campaign.hammer_tests.filter((test) => test.file.uploaded).length;
     const ready = campaign.usable + tested > 0 && !queue.running && (made?.done ?? true);
-    const mode = `${ready} ${campaign.usable} ${tested}`;
+    const names = ready ? taught(campaign) : [];
+    const mode = `${ready} ${campaign.usable} ${tested} ${names}`;
     if (made && !made.done) add(counts, made.box);
     if (mode === asked) return;
     asked = mode;
-    fill(next, ready ? identifyCard(campaign) : null);
+    fill(next, names.length ? learnCard(campaign, names) : null, ready ? identifyCard(campaign) : null);
   }
 
   let timer = null;

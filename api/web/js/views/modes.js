@@ -1,23 +1,10 @@
 // Modes with their uncertainties, and what the data could not tell.
 import { card, h, mark, note, table } from "../dom.js";
 import { plain, significant } from "../units.js";
+import { beforeAndAfter, withSpread } from "./spreads.js";
 
 const within = (mode, band) => mode.natural_frequency_hz >= band[0] && mode.natural_frequency_hz <= band[1];
 const size = (pair) => Math.hypot(...pair);
-
-/** A number with its standard deviation, both cut where the deviation says that digits end. */
-export function withSpread(value, spread, times = 1) {
-  // a mode at critical damping stays there: that is no number of a hundred digits
-  if (spread === null || spread === undefined || spread * times < 1e-6) return significant(value * times, 4);
-  const place = spread > 0 ? Math.max(0, 1 - Math.floor(Math.log10(spread * times))) : 3;
-  const digits = Math.min(place, 6);
-  return h(
-    "span",
-    { class: "nowrap" },
-    plain(value * times, digits, digits),
-    h("span", { class: "soft" }, ` ± ${plain(spread * times, digits, digits)}`),
-  );
-}
 
 /** How X and Y feel each other, where they do. */
 export function coupling(modes) {
@@ -121,23 +108,12 @@ function joint(values) {
   );
 }
 
-/** A number of a drawing and its standard deviation; contacts have ten digits in front of their point. */
-const numberOf = (value, spread) =>
-  Math.abs(value) < 1e5 ? withSpread(value, spread) : h("span", { class: "nowrap" }, power(value), h("span", { class: "soft" }, ` ± ${power(spread)}`));
-
-const power = (value) => {
-  const [digits, exponent] = value.toExponential(1).split("e");
-  return `${digits}·10${[...String(Number(exponent))].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`;
-};
-
 /** What the cuts taught of toolings whose drawings are not exact; what they hardly taught stands behind it. */
 export function drawings(modes) {
   if (!modes.toolings?.length) return null;
   const columns = [
     { name: "Tooling", cell: (r) => r.toolings.join(", ") },
-    { name: "What", cell: (r) => [r.what, h("span", { class: "soft small nowrap" }, ` ${r.unit}`)] },
-    { name: "Drawn", number: true, cell: (r) => numberOf(r.drawn, r.spread) },
-    { name: "Found", number: true, cell: (r) => numberOf(r.found, r.deviation) },
+    ...beforeAndAfter("Drawn", (r) => [r.drawn, r.spread], "Found", (r) => [r.found, r.deviation]),
   ];
   const [taught, hardly] = [false, true].map((wanted) => modes.toolings.filter((r) => r.hardly_taught === wanted));
   const box = card(

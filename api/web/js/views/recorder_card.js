@@ -1,4 +1,4 @@
-// A card that records a cut with the browser's microphone.
+// A card that records with the browser's microphone.
 import { card, fill, h, note, whisper } from "../dom.js";
 import { field, select } from "../forms.js";
 import { openMicrophone, refusal, wavFile, whyNot } from "../microphone.js";
@@ -7,8 +7,10 @@ import { plain } from "../units.js";
 /** Level below which nothing is heard [dB], and peak from which on the sound is cut off. */
 const [QUIET, FULL] = [-60, 0.999];
 
-/** The card; `onfile(file)` gets what was recorded. `.stop()` gives the microphone back. */
-export function recorderCard(onfile) {
+const HOW = "Hold the phone near the cut, some 30 cm from the tool where that is safe, and begin while the tool is cutting.";
+
+/** The card; `onfile(file)` gets what was recorded, `how` says how to record. `.stop()` gives the microphone back. */
+export function recorderCard(onfile, how = HOW) {
   const box = h("div", { class: "view" });
   const why = whyNot();
   const seconds = select(
@@ -90,7 +92,7 @@ export function recorderCard(onfile) {
   const made = card(
     "Record it here",
     null,
-    why ? note("doubt", why) : h("p", { class: "soft" }, "Hold the phone near the cut, some 30 cm from the tool where that is safe, and begin while the tool is cutting."),
+    why ? note("doubt", why) : h("p", { class: "soft" }, how),
     h("div", { class: "recorder" }, field("Length", seconds), h("div", { class: "row-of-buttons" }, record, stop, left), level),
     box,
   );

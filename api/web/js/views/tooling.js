@@ -7,6 +7,7 @@ import { go, holdsEdits, to } from "../router.js";
 import { machine } from "../state.js";
 import { q, text } from "../units.js";
 import { trail } from "./changes.js";
+import { contactCard } from "./contact_card.js";
 import { doubtCard } from "./doubt_card.js";
 import { catalogueBox } from "./holder_catalogue.js";
 import { segmentsTable } from "./segments.js";
@@ -14,12 +15,6 @@ import { SHAPES, START } from "./tooling_start.js";
 
 // of the tool inside the bore, in diameters of its shank: below it no clamping holds; as where the library asks for stickouts
 const LEAST_INSERTION = 1;
-const CONTACT = [
-  ["translational_stiffness", "Translational stiffness", "N/m per m"],
-  ["rotational_stiffness", "Rotational stiffness", "N m/rad per m"],
-  ["translational_damping", "Translational damping", "N s/m per m"],
-  ["rotational_damping", "Rotational damping", "N m s/rad per m"],
-];
 
 export async function view({ name = "" }, query, place) {
   const from = name || query.get("from");
@@ -49,11 +44,9 @@ export async function view({ name = "" }, query, place) {
   });
   const tool = segmentsTable("Tool, from its tip", "tool.segments", keys.tool.segments, () => changed());
   const holder = segmentsTable("Holder, from the tool to the flange", "holder.segments", keys.holder.segments, () => changed());
-  const contact = CONTACT.map(([key, label, unit]) => [
-    key,
-    quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
-  ]);
-
+  const taper = h("input", { autocomplete: "off", maxlength: 200 });
+  taper.value = keys.holder.taper ?? "";
+  const contact = contactCard(keys);
   const doubts = doubtCard(keys);
 
   /** The diameter of the tool where it is clamped. */
@@ -61,9 +54,10 @@ export async function view({ name = "" }, query, place) {
     const last = tool.rows().at(-1);
     return last.end_diameter_mm ?? last.outer_diameter_mm;
   }
-  function takeHolder(found, typical) {
+  function takeHolder(found, typical, behind) {
     holder.replace(found.segments);
-    if (typical) for (const [key, box] of contact) box.input.base = typical[key];
+    taper.value = behind;
+    if (typical) contact.take(typical);
     deep = insertion.input.base = found.insertion_mm;
     reclamp();
     changed();
@@ -129,17 +123,14 @@ export async function view({ name = "" }, query, place) {
       offer,
     ),
     card("Tool", null, tool.box),
-    card("Holder", null, holder.box, catalogueBox(shank, takeHolder)),
     card(
-      "Contact between tool and holder",
+      "Holder",
       null,
-      h(
-        "div",
-        { class: "fields" },
-        contact.map(([, box]) => box),
-      ),
-      h("p", { class: "small soft" }, "Per metre of insertion. All four empty: rigid."),
+      holder.box,
+      catalogueBox(shank, takeHolder),
+      h("div", { class: "fields" }, field("Behind the flange", taper, { name: "holder.taper", hint: "HSK-A63, BT40 …: hung on a string, it rings, too", double: true })),
     ),
+    contact.box,
     doubts.box,
   );
   add(
@@ -148,6 +139,7 @@ export async function view({ name = "" }, query, place) {
       title,
       null,
       name && machine()?.identification ? link(to("change", { tooling: name }), "Lobes", "button") : null,
+      name ? link(to(`toolings/ring/${part(name)}`), "Ring it", "button quiet") : null,
       name ? link(to("toolings/new", { from: name }), "Copy", "button quiet") : null,
       name ? h("button", { type: "button", class: "quiet", onclick: download }, "TOML file") : null,
       name ? h("button", { type: "button", class: "quiet danger", onclick: remove }, "Delete") : null,
@@ -178,6 +170,8 @@ export async function view({ name = "" }, query, place) {
       tool: { ...keys.tool, stickout_mm: stickout.input.base, segments: tool.rows() },
       holder: { ...keys.holder, insertion_mm: insertion.input.base, segments: holder.rows() },
     };
+    if (taper.value.trim()) found.holder.taper = taper.value.trim();
+    else delete found.holder.taper;
     if (shape.value === "flat") delete found.cutter.shape;
     else found.cutter.shape = shape.value;
     if (corner.input.base) found.cutter.corner_radius_mm = corner.input.base;
@@ -189,9 +183,7 @@ export async function view({ name = "" }, query, place) {
         .filter(Boolean)
         .map(Number);
     else delete found.cutter.pitch_deg;
-    delete found.contact;
-    if (contact.some(([, box]) => box.input.base !== null))
-      found.contact = Object.fromEntries(contact.map(([key, box]) => [key, box.input.base]));
+    contact.write(found);
     doubts.write(found);
     if (called.value.trim()) found.name = found.name && name ? found.name : called.value.trim();
     else delete found.name;

@@ -1,0 +1,61 @@
+"""What further cuts teach of toolings, in a worker: from stored samples to the toolings and the machine that they teach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from api.work import tasks
+from api.work.machine_cache import is_result, parsed
+from api.work.requests import MachineText
+from api.work.toolings import keys_of
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.results import layout, plain
+from rcsa_ident.io.taught_results import taught_result
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.signals.recording import Recording
+
+ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
+
+
+def learn(machine: MachineText, campaign: Campaign, read: ReadCut, teacher: str, teach: bool = False) -> dict[str, Any]:
+    """Return what the cuts of a campaign teach of toolings that are new to a machine.
+
+    Parameters
+    ----------
+    machine : MachineText
+    campaign : Campaign
+        With the cuts whose recordings are there.
+    read : callable
+    teacher : str
+        What the machine remembers of the campaign.
+    teach : bool
+        Whether the machine that the cuts teach is wanted, too: text and summary of its identification in `taught`; None where
+        something speaks against what was learned.
+
+    Raises
+    ------
+    InputError
+        A measured flange, a campaign that has taught this machine already, or as `learn_toolings`.
+    """
+    from rcsa_ident.workflows.identify import judge, left_out
+    from rcsa_ident.workflows.learn_toolings import learn_toolings, learnt_row
+
+    if not is_result(machine.text):
+        raise InputError("machine", "a measured flange", "a machine with an identification by the default method")
+    data = parsed(machine.text)
+    if teacher in data.get("taught_by", []):
+        raise InputError("campaign", "cuts that have taught this machine already", "a campaign of further cuts: these would count twice")
+    known = machine_from_json(data, "")
+    readings = judge(campaign, read)
+    found = learn_toolings(known, campaign, readings)
+    row = learnt_row(found)
+    for name, each, told in zip(found.keys, found.toolings, row["toolings"], strict=True):
+        told |= {"name": name, "tooling": None if each.contradiction else keys_of(each.tooling)}
+    text = layout(plain(taught_result(data, found.machine, teacher))) + "\n" if teach and found.good else None
+    return row | {
+        "left_out": [{"cut": cut, "reason": reason} for cut, reason in left_out(readings)],
+        "warnings": list(known.remarks),
+        "taught": None if text is None else {"text": text, "summary": tasks.check(text)},
+    }

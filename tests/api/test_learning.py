@@ -1,0 +1,163 @@
+"""What the cuts of a new tooling teach, over REST: looked at first, then written as versions, and never twice."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.client import Client
+from api.main import create_app
+from api.settings import Settings
+from api.work.worker import QueryLimits
+from tests.api.in_process import Here, embedded, refused
+from tests.fixtures import by_hand, further_cuts
+
+STIFFNESS = "translational stiffness of the contact"
+
+
+@pytest.fixture(scope="module")
+def known() -> str:
+    return further_cuts.result_text()
+
+
+def made(client: Client, result: str, **changed) -> tuple[str, str]:
+    """Ids of an identified machine, and of a campaign of two cuts with T7."""
+    machine = client.make_machine("HPM").id
+    client.identify(machine, result)
+    client.write_tooling("T7", further_cuts.drawn() | changed)
+    return machine, uploaded(client, machine, further_cuts.campaign())
+
+
+def uploaded(client: Client, machine: str, keys) -> str:
+    campaign = client.make_campaign(machine, keys).id
+    for file in further_cuts.files(keys):
+        client.upload(campaign, file)
+    return campaign
+
+
+def number(found, what=STIFFNESS):
+    (tooling,) = found.toolings
+    return next(row for row in tooling.learned if row.what == what)
+
+
+@pytest.mark.slow(20)
+def test_new_cuts_are_looked_at_and_taken_over(client, known):
+    """The contact is drawn at 0.7 of what it is; two cuts tell, and what is written is what was seen."""
+    machine, campaign = made(client, known)
+    assert client.campaign(campaign).rough_toolings == ["T7"]
+    assert client.machine(machine).identification.toolings == ["S1-ER32", "S2-PG25"]
+    library, identification = client.tooling("T7"), client.machine(machine).identification
+    found = client.learn(campaign)
+    assert (found.status, found.campaign, found.machine, found.written) == ("converged", campaign, machine, [])
+    row = number(found)
+    true = row.drawn / further_cuts.SOFTER
+    # nearer to what is true than the drawing, and surer
+    assert abs(row.found - true) < min(3.0 * row.found_std, 0.5 * abs(row.drawn - true))
+    assert row.found_std / row.found < 0.7 * row.drawn_std / row.drawn
+    assert max(found.model_error) < 0.1
+    # nothing was written
+    assert (client.tooling("T7"), client.machine(machine).identification) == (library, identification)
+
+    done = client.take_over(campaign, seen=found.etag)
+    assert (done.written, done.machine_written, done.toolings) == (["T7"], False, found.toolings)
+    kept = client.tooling("T7").tooling
+    assert kept.contact.translational_stiffness == pytest.approx(row.found)
+    assert kept.spread.contact_stiffness_percent < 40.0
+    assert [(c.version, c.why) for c in client.changes(kind="tooling", name="T7")] == [(2, "learned from the campaign new tool"), (1, "")]
+    assert client.machine(machine).identification == identification
+    # the same again writes nothing
+    assert client.take_over(campaign).written == []
+
+    both = client.take_over(campaign, machine=True, seen=found.etag, why="first cut")
+    assert (both.written, both.machine_written) == ([], True)
+    taught = client.machine(machine).identification
+    assert (taught.taught_by, taught.toolings) == ([f"new tool ({campaign})"], identification.toolings)
+    assert [c.why for c in client.changes(kind="identification", name=machine)] == ["first cut", ""]
+    assert client.tooltip(machine, "T7").axes["X"].re_std is not None
+    # what is known already would count twice
+    assert refused(422, client.learn, campaign).errors[0].field == "campaign"
+    assert refused(412, client.take_over, campaign, seen=found.etag).status == 412
+
+
+@pytest.mark.slow(20)
+def test_what_others_have_written_is_not_overwritten(client, known):
+    machine, campaign = made(client, known)
+    found = client.learn(campaign)
+    other = client.write_tooling("T7", further_cuts.drawn() | {"cutter": {"teeth": 3, "diameter_mm": 12.0}})
+    problem = refused(409, client.take_over, campaign, machine=True, seen=found.etag)
+    assert (problem.errors[0].found, "T7 of the library is not the one" in problem.detail) == ("T7", True)
+    assert client.tooling("T7").etag == other.etag
+    assert client.machine(machine).identification.taught_by == []
+    # without one in the library it is a new one
+    client.forget_tooling("T7")
+    assert client.take_over(campaign, seen=found.etag).written == ["T7"]
+    # another recording, another answer
+    keys = further_cuts.campaign()
+    client.forget_recording(campaign, further_cuts.files(keys)[-1].name)
+    refused(412, client.take_over, campaign, seen=found.etag)
+
+
+@pytest.mark.slow(5)
+def test_cuts_that_contradict_are_named_and_nothing_is_written(client, result):
+    """They are another machine's."""
+    machine, campaign = made(client, result)
+    found = client.learn(campaign)
+    (tooling,) = found.toolings
+    assert (found.status, tooling.tooling) == ("suspect", None)
+    assert "no tooling near its drawing explains its cuts" in tooling.contradiction
+    done = client.take_over(campaign, machine=True, seen=found.etag)
+    assert (done.written, done.machine_written) == ([], False)
+    assert client.machine(machine).identification.taught_by == []
+    assert len(list(client.changes(kind="tooling", name="T7"))) == 1
+
+
+@pytest.mark.slow(5)
+def test_refusals_are_the_commands(client, result, tmp_path):
+    machine, campaign = made(client, result)
+    exact = {key: value for key, value in further_cuts.drawn().items() if key != "spread"}
+    client.write_tooling("T7", exact)
+    problem = refused(422, client.learn, uploaded(client, machine, further_cuts.campaign(1)))
+    assert (problem.errors[0].field, "[spread]" in problem.errors[0].allowed) == ("spread", True)
+    empty = client.make_campaign(machine, further_cuts.campaign() | {"campaign": {"name": "empty", "sampling_rate_hz": 25600.0}}).id
+    assert "no recording" in refused(422, client.learn, empty).errors[0].found
+    client.identify(machine, by_hand.flange_file(tmp_path / "FLANGE.csv").read_text(encoding="utf-8"))
+    assert refused(422, client.learn, campaign).errors[0].found == "a measured flange"
+    bare = client.make_machine("bare").id
+    refused(404, client.learn, client.make_campaign(bare, further_cuts.campaign()).id)
+    refused(404, client.learn, "nothing")
+
+
+@pytest.mark.slow(5)
+def test_keys_and_groups(guarded_http, result):
+    http, keys = guarded_http
+    _, campaign = made(Client(key=keys["admin"], http=http), result)
+    for path, allowed in ((f"/v1/campaigns/{campaign}/learn", "run"), (f"/v1/campaigns/{campaign}/learn/take-over", "upload")):
+        assert http.post(path).status_code == 401
+        for name in ("read", "upload", "run"):
+            assert http.post(path, headers={"X-API-Key": keys[name]}).status_code == (200 if name == allowed else 403)
+        assert http.post(path, headers={"X-API-Key": keys["other"]}).status_code == 404
+
+
+def test_too_many_cuts_are_refused_in_words(tmp_path, result):
+    class Slow(Here):
+        async def run(self, call, *arguments):
+            if call.__name__ == "learn":
+                raise QueryLimits(seconds=7.0).too_long
+            return await super().run(call, *arguments)
+
+    with TestClient(create_app(Settings(data=tmp_path), embedded(tmp_path), Slow(), Here()), base_url="http://localhost") as http:
+        _, campaign = made(Client(http=http), result)
+        (fault,) = refused(422, Client(http=http).learn, campaign).errors
+    assert fault.found == "2 cuts, which take more than 7 s"
+    assert "one of the new toolings alone" in fault.allowed
+
+
+def test_a_result_says_by_whom_it_was_taught(client, result):
+    data = json.loads(result)
+    machine = client.make_machine("M").id
+    client.identify(machine, json.dumps(data | {"taught_by": ["new tool (c1)"]}))
+    assert client.machine(machine).identification.taught_by == ["new tool (c1)"]
+    for wrong in ("c1", [1], ["c"] * 201):
+        assert refused(422, client.identify, machine, json.dumps(data | {"taught_by": wrong})).errors[0].field.startswith("taught_by")
