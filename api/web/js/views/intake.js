@@ -136,7 +136,7 @@ function offer(place, found) {
     ),
     h(
       "div",
-      { class: "fields" },
+      { class: "fields broad" },
       field("Machine", which),
       naming,
     ),
