@@ -439,7 +439,7 @@ def _modes_above(machine: TipSource, tooling: Tooling, omega: FloatArray) -> lis
     above = np.arange(top, ABOVE * top, _ABOVE_STEP)
 
     def tip(at: FloatArray) -> Receptance:
-        found = source.tip(tooling, at, spread=False)
+        found = source.relative_tip(tooling, at, spread=False)
         assert not isinstance(found, TipModes)
         return found
 
