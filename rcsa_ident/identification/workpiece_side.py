@@ -31,10 +31,10 @@ _ZETA, _STIFFNESS = (math.log(0.03), 1.0), (math.log(5e7), 2.3)
 _LOW, _HIGH = 0.3, 1.5
 #: Where a new mode is tried: frequencies, and damping ratios.
 _PLACES, _DAMPING = 160, (0.01, 0.03, 0.1)
-#: Modes at most, and new ones that are polished of each step.
-MOST_MODES, _TRIED = 6, 3
-#: Share of the lines that is taken to be unexplained at first, least share, and how often it is worked out anew.
-_COARSE, _LEAST, _ROUNDS = 0.05, 5e-4, 4
+#: Modes at most, new ones that are polished of each step, and what each mode more costs of the evidence: e^-3 of its probability before.
+MOST_MODES, _TRIED, _FEW = 6, 3, 6.0
+#: Share of the lines' mean power that is taken to be unexplained at first, then of each line's own: at least so much, worked out so often.
+_COARSE, _LEAST, _ROUNDS = 0.1, 5e-4, 8
 #: Share of unexplained lines from which on it is told.
 _TELLING = 0.1
 
@@ -93,8 +93,8 @@ class _Lines:
     value : complex array, shape (n,) [m/N]
     variance : array, shape (n,) [m^2/N^2]
         Of the real and of the imaginary part each.
-    open : complex array, shape (n, q) [m/N]
-        How they change with what is not known of delays and forces, per standard deviation.
+    open : complex array, shape (n, q) [-]
+        How their logarithms change with what is not known of delays and forces, per standard deviation.
     """
 
     omega: FloatArray
@@ -119,10 +119,10 @@ class _Lines:
             # the workpiece is moved by minus the force on the tool
             values = -lines.receptance * np.exp(1j * lines.omega * found.delay[k]) / force
             columns = np.zeros((lines.omega.size, len(present) + len(found.coefficients)), dtype=complex)
-            columns[:, number] = 1j * lines.omega * values * found.delay_std[k]
+            columns[:, number] = 1j * lines.omega * found.delay_std[k]
             for i, (coefficient, (_, std)) in enumerate(found.coefficients.items()):
                 if coefficient in own:
-                    columns[:, len(present) + i] = -slope[:, own[coefficient]] * values * std
+                    columns[:, len(present) + i] = -slope[:, own[coefficient]] * std
             omega.append(lines.omega)
             value.append(values)
             variance.append(lines.variance.sum(axis=1) / np.abs(force) ** 2)
@@ -137,12 +137,15 @@ class _Problem:
     squares of [r; 0] less its part along Q are the least of |r + V z|^2 + |z|^2 over all z.
     """
 
-    def __init__(self, lines: _Lines, share: float) -> None:
+    def __init__(self, lines: _Lines, share: float, known: FloatArray | None = None) -> None:
         self.lines, self.share = lines, share
-        self.deviation = np.sqrt(lines.variance + 0.5 * share**2 * np.abs(lines.value) ** 2)
+        size = np.abs(lines.value) ** 2
+        # of all lines the same where no mode is known yet: what counts then are resonances, and not the valleys beside them
+        self.deviation = np.sqrt(lines.variance + 0.5 * share**2 * (np.mean(size) if known is None else size))
         # a line of nothing in a record without noise is not infinitely sure
         self.deviation = np.maximum(self.deviation, 1e-6 * float(np.max(np.abs(lines.value), initial=1e-30)))
-        opened = self._white(lines.open.T)
+        # what a delay or a force changes of modes: of lines it would take those for surest that noise has made small
+        opened = self._white(lines.open.T * (lines.value if known is None else gives_way(known, lines.omega)[0]))
         self.along = np.linalg.qr(np.vstack([opened, np.eye(opened.shape[1])]))[0]
         self.points = 2 * lines.omega.size
         self.target = self._projected(self._white(lines.value[None]))[:, 0]
@@ -174,6 +177,8 @@ class _Problem:
 
     def polished(self, logs: FloatArray) -> FloatArray:
         """The same modes where the misfit is least, shape (3, m)."""
+        if not logs.size:
+            return logs
         low = np.repeat([self.range[0] - 1.0, math.log(1e-4), -np.inf], logs.shape[1])
         high = np.repeat([self.range[1] + 1.0, math.log(0.9), np.inf], logs.shape[1])
         found = scipy.optimize.least_squares(
@@ -189,8 +194,11 @@ class _Problem:
         sign, volume = np.linalg.slogdet(jacobian.T @ jacobian)
         known = -2.0 * modes * float(np.sum(np.log(self.spread)))
         # modes may stand in any order: as many equal minima
-        value = float(rows @ rows + volume - known - 2.0 * math.lgamma(modes + 1))
-        return value if sign > 0.0 else np.inf
+        value = float(rows @ rows + volume - known - 2.0 * math.lgamma(modes + 1)) + _FEW * modes
+        omega, zeta = np.sort(np.exp(logs[0])), np.exp(logs[1][np.argsort(logs[0])])
+        # a point shows modes within each other's half-power width as one, and how they share its compliance has no volume of its own
+        apart = np.all(np.diff(omega) > 0.5 * (zeta[1:] * omega[1:] + zeta[:-1] * omega[:-1]))
+        return value if sign > 0.0 and apart else np.inf
 
     def promising(self, logs: FloatArray) -> Iterator[FloatArray]:
         """Yield one mode more, at those places where one that gives way lowers the misfit most; the others stay as they are."""
@@ -208,16 +216,17 @@ class _Problem:
             yield np.column_stack([logs, [omega, zeta, np.log(size[best] / along[best])]])
             gain[np.abs(np.array([each for each, _ in places]) - omega) < 0.1] = 0.0
 
-    def grown(self) -> FloatArray:
-        """Return as many modes as the evidence asks for, shape (3, m), by rising frequency."""
-        logs, least = np.zeros((3, 0)), self.evidence(np.zeros((3, 0)))
-        while logs.shape[1] < MOST_MODES:
-            trials = [self.polished(each) for each in self.promising(logs)]
+    def chosen(self, logs: FloatArray) -> FloatArray:
+        """Return as many modes as the evidence asks for, shape (3, m), by rising frequency: from these on, one more or one less a step."""
+        logs = self.polished(logs)
+        least = self.evidence(logs)
+        while True:
+            more = self.promising(logs) if logs.shape[1] < MOST_MODES else iter(())
+            trials = [self.polished(each) for each in (*more, *(np.delete(logs, n, axis=1) for n in range(logs.shape[1])))]
             values = [self.evidence(each) for each in trials]
             if not values or min(values) >= least:
-                break
+                return logs[:, np.argsort(logs[0])]
             logs, least = trials[int(np.argmin(values))], min(values)
-        return logs[:, np.argsort(logs[0])]
 
     def unexplained(self, logs: FloatArray) -> float:
         """Return the share of the lines that neither modes nor noise explain."""
@@ -241,11 +250,12 @@ class _Problem:
 def _fit(lines: _Lines) -> tuple[FloatArray, _Problem]:
     """Modes on the lines, and the misfit with the share of them that is left unexplained."""
     problem = _Problem(lines, _COARSE)
-    logs = problem.grown()
+    logs = problem.chosen(np.zeros((3, 0)))
     for _ in range(_ROUNDS):
         share = problem.unexplained(logs)
-        if abs(math.log(share / problem.share)) < 0.05:
+        settled = abs(math.log(share / problem.share)) < 0.05
+        problem = _Problem(lines, share, logs)
+        logs = problem.chosen(logs)
+        if settled:
             break
-        problem = _Problem(lines, share)
-        logs = problem.grown()
     return logs, problem
