@@ -34,7 +34,8 @@ _PLACES, _DAMPING = 160, (0.01, 0.03, 0.1)
 #: Modes at most, new ones that are polished of each step, and what each mode more costs of the evidence: e^-3 of its probability before.
 MOST_MODES, _TRIED, _FEW = 6, 3, 6.0
 #: Share of the lines' mean power that is taken to be unexplained at first, then of each line's own: at least so much, worked out so often.
-_COARSE, _LEAST, _ROUNDS = 0.1, 5e-4, 8
+#: Between a force that is simulated and a point that is not the cut itself nothing is better than the least.
+_COARSE, _LEAST, _ROUNDS = 0.1, 2e-3, 8
 #: Share of unexplained lines from which on it is told.
 _TELLING = 0.1
 
