@@ -136,7 +136,7 @@ def _show_workpiece_side(side: WorkpieceSide) -> None:
             column.justify = "right"
         for row in side_mode_rows(side):
             stds = row.frequency_std_hz, row.damping_std_percent, row.stiffness_std_n_per_um
-            cells = f"{row.frequency_hz:.1f}", f"{row.damping_percent:.2f}", f"{row.stiffness_n_per_um:.3g}"
+            cells = f"{row.frequency_hz:.1f}", f"{row.damping_percent:.2f}", two_digits(stds[-1], row.stiffness_n_per_um)
             table.add_row(row.axis, *(text for cell, std in zip(cells, stds, strict=True) for text in (cell, two_digits(std))))
         show(table)
     for axis, words in side_captions(side).items():
