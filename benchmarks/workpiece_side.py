@@ -232,7 +232,8 @@ def main(arguments: Sequence[str]) -> None:
         for row in compare(setup, found, seed):
             append_row(path, row)
         append_row(modes_path, told(setup, found, seed))
-    rows, modes = ([row for row in read_rows(each) if row["seed"] in given.seeds] for each in (path, modes_path))
+    kept = ([row for row in read_rows(each) if row["seed"] in given.seeds] for each in (path, modes_path))
+    rows, modes = (sorted(each, key=lambda row: row["seed"]) for each in kept)
     text = f"{table(rows)}\n\n{modes_table(modes)}"
     print(f"\n{text}")
     if given.page:
