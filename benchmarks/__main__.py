@@ -39,6 +39,7 @@ STUDIES = (
     "labelled_cuts",
     "learn",
     "ring",
+    "workpiece_side",
 )
 
 

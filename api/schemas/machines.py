@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -118,6 +118,27 @@ class AxisModes(Answer):
     misfit_per_point: float | None
 
 
+class SideMode(Answer):
+    """A mode of the workpiece's side of the cut."""
+
+    natural_frequency_hz: float
+    natural_frequency_std_hz: float
+    damping_ratio: float
+    damping_ratio_std: float
+    stiffness_n_per_m: float
+    stiffness_std_n_per_m: float
+
+
+class SideModes(Answer):
+    """What gives way on the workpiece's side along an axis."""
+
+    sensor: str = Field(description="The accelerometer that showed it.")
+    role: Literal["table", "workpiece"] = Field(description="What that is fixed to.")
+    lines: int
+    modes: list[SideMode] = Field(description="Empty where nothing stands above the noise.")
+    misfit_per_point: float
+
+
 class LearnedNumber(Answer):
     """A number of a drawing before and after the cuts."""
 
@@ -140,6 +161,9 @@ class Modes(Answer):
     band_hz: list[float]
     axes: dict[str, AxisModes]
     both_planes: BothPlanesModes | None = Field(None, description="Where X and Y feel each other: the modes of both together.")
+    workpiece_side: dict[str, SideModes] = Field(
+        {}, description="What gives way under the workpiece, by axis: limits hold for tool and workpiece together, a tip FRF is the tool's."
+    )
     toolings: list[LearnedNumber] = Field([], description="What the cuts taught of toolings whose drawings are not exact.")
 
 

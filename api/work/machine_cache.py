@@ -122,10 +122,12 @@ def _finite(machine: IdentifiedMachine, omega: np.ndarray) -> bool:
     try:
         with np.errstate(all="ignore"):
             sides = [side.kept() for side in machine.sides(omega)]
+            gives_way = () if machine.workpiece_side is None else machine.workpiece_side.yielding.values()
+            beside = [part for each in gives_way for part in (each.receptance(omega), each.changes(omega))]
     except (ArithmeticError, np.linalg.LinAlgError, InputError):
         return False
     ends = [part for side in sides if side.ends is not None for part in (side.ends.ahead, side.ends.behind)]
-    kept = [*ends, *(part for side in sides for part in (side.nominal, side.rivals))]
+    kept = [*ends, *beside, *(part for side in sides for part in (side.nominal, side.rivals))]
     return all(np.all(np.isfinite(part)) for part in kept)
 
 
@@ -138,6 +140,8 @@ def _limits(data: dict[str, Any]) -> None:
     for table in (data, *bands):
         named = {f"axes.{name}": axis for name, axis in table["axes"].items()}
         named |= {"both_planes": table["both_planes"]} if isinstance(table.get("both_planes"), dict) else {}
+        side = table.get("workpiece_side")
+        named |= {f"workpiece_side.{name}": axis for name, axis in side.items() if isinstance(axis, dict)} if isinstance(side, dict) else {}
         for name, axis in named.items():
             for key, most in (("modes", MOST_MODES), ("unknowns", MOST_UNKNOWNS), ("rivals", MOST_RIVALS)):
                 value = axis.get(key) or []

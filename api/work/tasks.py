@@ -87,7 +87,11 @@ def modes(text: str) -> dict[str, Any]:
     if whole is not None:
         rows = [{key: mode.get(key) for key in _WHOLE_MODE} for mode in whole["modes"]]
         both = {"in_words": whole.get("in_words", ""), "modes": rows, "gyroscopic": whole["layout"]["turning"] != 0}
-    told = {"axes": axes, "both_planes": both, "toolings": data.get("toolings", {}).get("learned", [])}
+    side = {
+        name: {key: axis[key] for key in ("sensor", "role", "lines", "modes")} | {"misfit_per_point": axis["misfit"]["chi2_per_point"]}
+        for name, axis in data.get("workpiece_side", {}).items()
+    }
+    told = {"axes": axes, "both_planes": both, "workpiece_side": side, "toolings": data.get("toolings", {}).get("learned", [])}
     return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | told
 
 

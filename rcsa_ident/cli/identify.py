@@ -161,6 +161,7 @@ def identify(
         summary |= {key: data[key] for key in ("notes", "coefficients")}
         axes = {name: {k: axis[k] for k in ("modes", "joint", "misfit", "model_error")} for name, axis in data["axes"].items()}
         summary |= {"toolings": data["toolings"].get("learned", [])} if "toolings" in data else {}
+        summary |= {"workpiece_side": data["workpiece_side"]} if "workpiece_side" in data else {}
         emit(summary | {"axes": axes, "seconds": stages.seconds, "result": str(out)})
     else:
         from rcsa_ident.cli.tables import show_identification

@@ -54,11 +54,14 @@ def tooltip(
             show_default=False,
         ),
     ] = None,
+    relative: Annotated[
+        bool, typer.Option("--relative", help="Relative to the workpiece, where that gives way, too: what lobes are computed from.")
+    ] = False,
     bands: Bands = True,
     stiffness_spread: StiffnessSpread = 0.05,
     json_: Json = False,
 ) -> None:
-    """Predict the tooltip FRF of any tooling on the identified machine."""
+    """Predict the tooltip FRF of any tooling on the identified machine: the tool's own, whatever gives way on the workpiece's side."""
     from rcsa_ident.errors import positive
     from rcsa_ident.io.curves import write_tip_csv
     from rcsa_ident.io.setups import read_tooling
@@ -74,7 +77,7 @@ def tooltip(
     frequency = inclusive(first, last, step, ("--from", "--to", "--step"), "Hz")
     stages = Stages(quiet=json_)
     with stages.stage("tooltip"):
-        found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, share)
+        found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, share, relative)
         deviation = found.tip.deviation()
     write_tip_csv(out, found.tip)
     peaks = peaks_of(frequency, found.tip, deviation)

@@ -14,6 +14,7 @@ from rich.table import Table
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
+from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.report.summaries import (
     DrawingRow,
     ModeRow,
@@ -25,6 +26,7 @@ from rcsa_ident.report.summaries import (
     two_digits,
     whole_mode_rows,
 )
+from rcsa_ident.report.workpiece_side import side_captions, side_mode_rows
 from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, PlannedCut, SpeedWindow
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.tested_cuts import Tally
@@ -116,10 +118,29 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
         out.print(f"{escape(each.name)}: {two_digits(each.std, each.value)} ± {two_digits(each.std)} {each.unit}")
     if found.learned:
         show(_drawings(drawing_rows(found.learned)))
+    if found.workpiece_side is not None:
+        _show_workpiece_side(found.workpiece_side)
     for note in found.notes:
         if note == found.coupling:
             continue
         out.print(f"note: {escape(note)}")
+
+
+def _show_workpiece_side(side: WorkpieceSide) -> None:
+    """Print what gives way on the workpiece's side, and what it was found from."""
+    if side.yielding:
+        table = Table(
+            "axis", "f_n Hz", "±", "zeta %", "±", "stiffness N/µm", "±", title="modes of the workpiece's side", title_justify="left"
+        )
+        for column in table.columns[1:]:
+            column.justify = "right"
+        for row in side_mode_rows(side):
+            stds = row.frequency_std_hz, row.damping_std_percent, row.stiffness_std_n_per_um
+            cells = f"{row.frequency_hz:.1f}", f"{row.damping_percent:.2f}", two_digits(stds[-1], row.stiffness_n_per_um)
+            table.add_row(row.axis, *(text for cell, std in zip(cells, stds, strict=True) for text in (cell, two_digits(std))))
+        show(table)
+    for axis, words in side_captions(side).items():
+        console().print(f"  {axis}: {escape(words)}")
 
 
 def _drawings(rows: Sequence[DrawingRow]) -> Table:

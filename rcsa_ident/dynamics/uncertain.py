@@ -31,6 +31,7 @@ class Doubted(StrEnum):
     LENGTHS = "the tool's stickout and lengths"
     HOLDER = "the holder's diameter"
     STIFFNESS = "the tool-holder's stiffness"
+    WORKPIECE = "table and workpiece"
     COEFFICIENTS = "the cutting coefficients"
     MACHINE = "the machine"
 

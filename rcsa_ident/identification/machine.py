@@ -21,6 +21,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machine.tip import Side
+from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
@@ -81,6 +82,8 @@ class IdentifiedMachine(Machine):
         Of a machine whose planes feel each other; `identified` then is each plane at standstill, without the other one.
     toolings : KnownToolings or None
         What its cuts told of toolings whose drawings are not exact.
+    workpiece_side : WorkpieceSide or None
+        What accelerometers on table or workpiece showed.
     """
 
     identified: Mapping[Dof, MachineAxis]
@@ -94,6 +97,7 @@ class IdentifiedMachine(Machine):
     name: str = ""
     whole: CoupledPosterior | None = None
     toolings: KnownToolings | None = None
+    workpiece_side: WorkpieceSide | None = None
     kept_sides: tuple[Side, ...] = field(default=(), repr=False)
 
     @cached_property
@@ -167,7 +171,9 @@ class IdentifiedMachine(Machine):
     @property
     def remarks(self) -> tuple[str, ...]:
         """What speaks against everything that is computed with it."""
-        return () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
+        doubts = () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
+        words = "" if self.workpiece_side is None else self.workpiece_side.words
+        return (*doubts, words) if words else doubts
 
     def posteriors(self) -> dict[Dof, Posterior]:
         """Return what is known of each axis by itself.

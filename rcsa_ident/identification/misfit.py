@@ -355,33 +355,8 @@ class WeightedLines:
         return holder
 
     def force(self, logs: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """What the forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c).
-
-        Terms that are told in `exact` add up, K_tc e^t (U_1 + k_rc e^r U_2) + K_te e^p U_3 + K_re e^q U_4, with the shares of the sum that
-        their slopes are at the values that were told; the others multiply.
-        """
-        slope = self.force_slope[:, : logs.size]
-        if not self.exact:
-            return np.exp(slope @ logs), slope
-        places = {term: self.exact[term] for term in self.exact if self.exact[term] < logs.size}
-        rest = logs.copy()
-        rest[list(places.values())] = 0.0
-        nothing = np.zeros(slope.shape[0])
-        share = {term: slope[:, k] for term, k in places.items()}
-        grown = {term: np.exp(logs[k]) for term, k in places.items()}
-        edges = [term for term in (ForceTerm.TANGENTIAL_EDGE, ForceTerm.RADIAL_EDGE) if term in places]
-        chip = share.get(ForceTerm.TANGENTIAL, 1.0 - sum((share[term] for term in edges), nothing))
-        ratio, tangential = share.get(ForceTerm.RATIO, nothing), grown.get(ForceTerm.TANGENTIAL, 1.0)
-        radial = tangential * ratio * grown.get(ForceTerm.RATIO, 1.0)
-        parts = {ForceTerm.TANGENTIAL: tangential * (chip - ratio) + radial, ForceTerm.RATIO: radial}
-        parts |= {term: share[term] * grown[term] for term in edges}
-        total = parts[ForceTerm.TANGENTIAL] + sum(
-            (parts[term] for term in edges), 1.0 - chip - sum((share[term] for term in edges), nothing)
-        )
-        slope = slope.copy()
-        for term, k in places.items():
-            slope[:, k] = parts[term] / total
-        return total * np.exp(self.force_slope[:, : logs.size] @ rest), slope
+        """What the forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c)."""
+        return scaled_force(self.force_slope[:, : logs.size], logs, self.exact)
 
     def jacobian(
         self,
@@ -403,6 +378,41 @@ class WeightedLines:
             out[np.ix_(lines, columns)] = change.real
             out[np.ix_(rows.shape[0] + lines, columns)] = change.imag
         return out
+
+
+def scaled_force(slope: ComplexArray, logs: FloatArray, exact: Mapping[ForceTerm, int]) -> tuple[ComplexArray, ComplexArray]:
+    """Return what forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c).
+
+    Terms that are told in `exact` add up, K_tc e^t (U_1 + k_rc e^r U_2) + K_te e^p U_3 + K_re e^q U_4, with the shares of the sum that
+    their slopes are at the values that were told; the others multiply.
+
+    Parameters
+    ----------
+    slope : complex array, shape (n, c) [-]
+        Change of the simulated force's logarithm with each unknown.
+    logs : array, shape (c,)
+    exact : mapping of ForceTerm to int
+        Places of the terms that add up among the unknowns.
+    """
+    if not exact:
+        return np.exp(slope @ logs), slope
+    places = {term: exact[term] for term in exact if exact[term] < logs.size}
+    rest = logs.copy()
+    rest[list(places.values())] = 0.0
+    nothing = np.zeros(slope.shape[0])
+    share = {term: slope[:, k] for term, k in places.items()}
+    grown = {term: np.exp(logs[k]) for term, k in places.items()}
+    edges = [term for term in (ForceTerm.TANGENTIAL_EDGE, ForceTerm.RADIAL_EDGE) if term in places]
+    chip = share.get(ForceTerm.TANGENTIAL, 1.0 - sum((share[term] for term in edges), nothing))
+    ratio, tangential = share.get(ForceTerm.RATIO, nothing), grown.get(ForceTerm.TANGENTIAL, 1.0)
+    radial = tangential * ratio * grown.get(ForceTerm.RATIO, 1.0)
+    parts = {ForceTerm.TANGENTIAL: tangential * (chip - ratio) + radial, ForceTerm.RATIO: radial}
+    parts |= {term: share[term] * grown[term] for term in edges}
+    total = parts[ForceTerm.TANGENTIAL] + sum((parts[term] for term in edges), 1.0 - chip - sum((share[term] for term in edges), nothing))
+    moved = slope.copy()
+    for term, k in places.items():
+        moved[:, k] = parts[term] / total
+    return total * np.exp(slope @ rest), moved
 
 
 class Answer(Protocol):

@@ -350,7 +350,7 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
         squares = counted * (rest[: weight.size] ** 2 + rest[weight.size :] ** 2) / weight
         size = axis.power.ravel()
         freedom = 2.0 * float(np.sum(asked)) * free
-        shares.append(_share(squares[asked], axis.variance.ravel()[asked], size[asked], freedom, smallest))
+        shares.append(unexplained_share(squares[asked], axis.variance.ravel()[asked], size[asked], freedom, smallest))
     return tuple(shares)
 
 
@@ -375,8 +375,21 @@ def cut_weights(solution: Solution, misfit: Misfit) -> FloatArray:
     return np.where(out & (usual > 0.0), usual / np.maximum(mean, 1e-300), 1.0)
 
 
-def _share(squares: FloatArray, noise: FloatArray, size: FloatArray, freedom: float, smallest: float) -> float:
-    """Solve for the share by bisection of its logarithm: the sum falls with it."""
+def unexplained_share(squares: FloatArray, noise: FloatArray, size: FloatArray, freedom: float, smallest: float) -> float:
+    """Return the share f with sum squares / (noise + f^2 size / 2) = freedom, `smallest` at least and 1 at most.
+
+    By bisection of its logarithm: the sum falls with it.
+
+    Parameters
+    ----------
+    squares : array, shape (n,)
+        Squared residuals of lines, real and imaginary part together.
+    noise : array, shape (n,)
+        Variance of the real and of the imaginary part each.
+    size : array, shape (n,)
+        Power of the lines.
+    freedom, smallest : float
+    """
     low, high = smallest, 1.0
     # lines of nothing, in a record without noise, say nothing about shares
     informative = (noise > 0.0) | (size > 0.0)

@@ -22,6 +22,7 @@ from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.progress import Step
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.remarks import Remark, says
 from rcsa_ident.shown import Shown
@@ -58,6 +59,7 @@ class IdentificationCode(StrEnum):
     DRAWINGS_EXACT = "drawings-exact"
     CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
     MOSTLY_PASSES = "mostly-passes"
+    WORKPIECE_SIDE = "workpiece-side"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,6 +185,8 @@ class Identification(Shown):
         What the cuts told of toolings whose drawings are not exact.
     learned : tuple of LearnedValue
         The same in the terms of the campaign's drawings.
+    workpiece_side : WorkpieceSide or None
+        What accelerometers on table or workpiece showed.
     """
 
     status: Status
@@ -203,6 +207,7 @@ class Identification(Shown):
     whole: CoupledPosterior | None = None
     toolings: KnownToolings | None = None
     learned: tuple[LearnedValue, ...] = ()
+    workpiece_side: WorkpieceSide | None = None
 
     @property
     def at_minimum(self) -> bool:
@@ -245,6 +250,7 @@ class Identification(Shown):
             name=self.campaign,
             whole=self.whole,
             toolings=self.toolings,
+            workpiece_side=self.workpiece_side,
         )
 
     def __str__(self) -> str:

@@ -22,6 +22,7 @@ from rcsa_ident.io.drawings import axis_toolings_of, axis_toolings_to_json, know
 from rcsa_ident.io.results import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
 from rcsa_ident.io.setups import sensor_of
 from rcsa_ident.io.validated_table import Table, describe
+from rcsa_ident.io.workpiece_sides import workpiece_side_of, workpiece_side_to_json
 from rcsa_ident.io.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Campaign
@@ -80,6 +81,7 @@ def identification_to_json(
         ),
         "axes": _axes_to_json(identification, deviations or {}),
         **_both_planes(identification, deviations or {}),
+        **({} if identification.workpiece_side is None else {"workpiece_side": workpiece_side_to_json(identification.workpiece_side)}),
         "delays": _delays(identification, campaign),
     }
 
@@ -228,6 +230,7 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         name=data["campaign"]["name"],
         whole=_whole(top),
         toolings=toolings,
+        workpiece_side=workpiece_side_of(top),
     )
 
 

@@ -17,14 +17,16 @@ from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP
-from rcsa_ident.units import from_rpm, to_rpm
+from rcsa_ident.units import from_hz, from_rpm, to_rpm
 from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
 from rcsa_ident.virtual.sensors import UNDISTURBED, SensorSuite
+from rcsa_ident.virtual.workpiece_side import ROLES, SideMode, VirtualWorkpieceSide
 
-_TOP = ("machine", "shaft", "materials", "bearings", "housing", "joint", "sensors", "disturbances", "workpiece", "cuts")
+_TOP = ("machine", "shaft", "materials", "bearings", "housing", "joint", "workpiece_side", "sensors", "disturbances", "workpiece", "cuts")
 _BEARING = ("position_mm", "stiffness", "damping", "softening_per_rpm", "angle_deg")
 _HOUSING = ("position_mm", "mass", "inertia", "stiffness", "damping", "tilting_stiffness", "tilting_damping", "angle_deg")
+_SIDE_MODE = ("natural_frequency_hz", "damping_ratio", "stiffness_n_per_m")
 _JOINT = ("translational_stiffness", "translational_damping", "rotational_stiffness", "rotational_damping")
 _SENSORS = (
     "sampling_rate_hz", "fixture_position_mm", "housing_positions_mm", "flange_sensitivity", "flange_noise_nm", "flange_drift_um",
@@ -57,6 +59,8 @@ class MachineFile:
     truth_toolings : tuple of Path
         Toolings that never cut, whose receptances are wanted.
     disturbances : Disturbances
+    workpiece_side : VirtualWorkpieceSide or None
+        What gives way under the workpiece, with a pair of accelerometers on it; None where it is rigid.
     """
 
     name: str
@@ -67,6 +71,7 @@ class MachineFile:
     toolings: tuple[Path, ...]
     truth_toolings: tuple[Path, ...] = ()
     disturbances: Disturbances = UNDISTURBED
+    workpiece_side: VirtualWorkpieceSide | None = None
 
 
 def read_machine(path: str | Path) -> MachineFile:
@@ -124,6 +129,7 @@ def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> 
             toolings=_paths(cuts, "toolings", folder, required=True),
             truth_toolings=_paths(cuts, "truth_toolings", folder, required=False),
             disturbances=_disturbances(top.table("disturbances", _DISTURBANCES, {})),
+            workpiece_side=_workpiece_side(top.table("workpiece_side", ("role", "x", "y"))) if "workpiece_side" in top else None,
         )
 
 
@@ -157,6 +163,21 @@ def _joint(table: Table) -> FlangeJoint:
         table.number(damped, "N s/m", least=0.0),
         table.number(stiff_turning, "N m/rad", above=0.0),
         table.number(damped_turning, "N m s/rad", least=0.0),
+    )
+
+
+def _workpiece_side(table: Table) -> VirtualWorkpieceSide:
+    def modes(axis: str) -> tuple[SideMode, ...]:
+        return tuple(_side_mode(mode) for mode in table.tables(axis, _SIDE_MODE)) if axis in table else ()
+
+    return VirtualWorkpieceSide(modes("x"), modes("y"), table.text("role", "table", choices=ROLES))
+
+
+def _side_mode(table: Table) -> SideMode:
+    return SideMode(
+        from_hz(table.number("natural_frequency_hz", "Hz", above=0.0, most=1e5)),
+        table.number("damping_ratio", "", above=0.0, most=0.999),
+        table.number("stiffness_n_per_m", "N/m", above=0.0),
     )
 
 

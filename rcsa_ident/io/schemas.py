@@ -111,6 +111,7 @@ _HOUSING = {
     "position_mm": 190.0, "mass": 160.0, "inertia": 5.5, "stiffness": [8.3e7, 7e7], "damping": [1.1e4, 1e4],
     "tilting_stiffness": [1.1e7, 9.5e6], "tilting_damping": [9e2, 8e2],
 }  # fmt: skip
+_SIDE_MODE = {"natural_frequency_hz": 420.0, "damping_ratio": 0.04, "stiffness_n_per_m": 1e7}
 _MACHINE: dict[str, Any] = {
     "shaft": {"segments": [*_HOLDER["segments"], {"length_mm": 500.0, "outer_diameter_mm": 88.0, "material": "steel"}]},
     "bearings": [_BEARING],
@@ -126,6 +127,7 @@ _MACHINES = (
         "shaft": {"segments": [*_SEGMENTS, {"length_mm": 500.0, "outer_diameter_mm": 88.0, "material": "steel"}]},
         "materials": _MATERIALS,
         "cuts": {**_MACHINE["cuts"], "spindle_speeds_rpm": {"from": 8000.0, "to": 20_000.0, "count": 4}},
+        "workpiece_side": {"y": [_SIDE_MODE]},
     },
     _MACHINE
     | {
@@ -134,6 +136,7 @@ _MACHINES = (
             "passes_rpm": {"from": 8000.0, "to": 20_000.0, "count": 12},
         },
         "sensors": {"housing_positions_mm": [350.0]},
+        "workpiece_side": {"role": "workpiece", "x": [_SIDE_MODE]},
     },
 )
 _MODE = {"natural_frequency_hz": 500.0, "damping_ratio": 0.03}

@@ -33,7 +33,7 @@ from rcsa_ident.plausibility import (
     SPINDLE_SPEED,
     STICKOUT,
 )
-from rcsa_ident.signals.motion import measured_axes, motion_channels
+from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, behind, clamped
 from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, Spread
@@ -328,6 +328,7 @@ def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
     with top.naming({}):
         if axes := measured_axes(sensors):
             motion_channels(sensors, axes)
+        workpiece_channels(sensors)
 
 
 def sensor_of(name: str, data: Any, where: str) -> Sensor:

@@ -20,7 +20,7 @@ from rcsa_ident.io.setups import cut_keys
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.units import to_rpm
+from rcsa_ident.units import from_hz, to_rpm
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
 from rcsa_ident.virtual.sensors import accelerometer_places
 
@@ -36,7 +36,8 @@ class SimulatedCampaign:
     folder : Path
     truth : Path
         ``tip/``, ``cross/``, ``spindle.csv``: receptances at the mean of the speeds, with the terms between X and Y where there are
-        some; ``tip/`` and ``cross/`` of a machine that changes with the speed also at the slowest and the fastest. ``records.csv``:
+        some; ``tip/`` and ``cross/`` of a machine that changes with the speed also at the slowest and the fastest.
+        ``workpiece_side.csv``: what gives way under the workpiece, where something does. ``records.csv``:
         true speeds and tooth angles at the first sample; ``forces/``: lines of the true force. No reader of the folder sees it.
     cuts : int
     """
@@ -94,6 +95,9 @@ def write_simulation(
             if progress is not None:
                 progress(done, total)
         write_text(known / "records.csv", "\n".join(rows) + "\n")
+        if setup.workpiece_side is not None:
+            gives_way = np.einsum("nii->ni", setup.workpiece_side.receptance(from_hz(flange.frequency_hz)))
+            _write_columns(known / "workpiece_side.csv", ("frequency_hz",), flange.frequency_hz, gives_way)
         mean = float(np.mean(setup.plan.programmed))
         for true in receptances:
             speed = None if true.spindle_speed == mean else true.spindle_speed
@@ -142,10 +146,11 @@ def campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
     gap = ("displacement", suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
     acceleration = ("acceleration", suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth)
     sensors = {f"flange_{axis.lower()}": _sensor(axis, *gap) for axis in "XY"}
-    places = accelerometer_places(len(setup.spindle.housing_positions))
+    side = None if setup.workpiece_side is None else setup.workpiece_side.role
+    places = accelerometer_places(len(setup.spindle.housing_positions), side)
     for place in places:
         # one accelerometer beside a displacement sensor is its fixture's, several say what they are fixed to
-        role = {"role": "fixture" if place == places[0] else "spindle"} if len(places) > 1 else {}
+        role = {"role": "fixture" if place == places[0] else place if place == side else "spindle"} if len(places) > 1 else {}
         sensors |= {f"{place}_{axis.lower()}": _sensor(axis, *acceleration) | role for axis in "XY"}
     if suite.trigger:
         angle = float(f"{np.degrees(suite.tooth_angle):.9g}")

@@ -22,6 +22,7 @@ from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.mode_synthesis import poles_of
 from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
 from rcsa_ident.machine.tip import Side, tip_over_sides
+from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.tip_modes import TipModes
@@ -107,16 +108,28 @@ class TipSource(Shown, ABC):
     ) -> UncertainReceptance | TipModes:
         """Return what the tip of a tooling does."""
 
+    def relative_tip(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
+    ) -> UncertainReceptance | TipModes:
+        """Return what the tip does relative to the workpiece: what a chip feels, and limits are computed from; parameters as of `tip`."""
+        return self.tip(tooling, omega, spread, stiffness_spread)
+
 
 class Machine(TipSource, Drawn):
     """What stands behind the flange.
 
     A subclass says what it is by `parts` and `band`, and what else it knows of itself: how it changes with the speed (`at`, `models`,
-    `speed_range`), what speaks against it (`remarks`), and what it has learned of toolings (`toolings`).
+    `speed_range`), what speaks against it (`remarks`), and what it has learned of toolings (`toolings`) and of the workpiece's side.
     """
 
     #: What its cuts told of toolings whose drawings are not exact.
     toolings: KnownToolings | None = None
+    #: What gives way under the workpiece, where accelerometers showed it; None where it is taken as rigid.
+    workpiece_side: WorkpieceSide | None = None
 
     @property
     @abstractmethod
@@ -235,6 +248,20 @@ class Machine(TipSource, Drawn):
         if len(sides) == 1:
             tip = replace(tip, poles=partial(poles_of, drawing.assembly, sides[0].part.believed, float(tip.omega[-1]), turning))
         return tip if spread else replace(tip, variation=None)
+
+    def relative_tip(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
+    ) -> UncertainReceptance:
+        """Return the receptance between the tip and the workpiece, C11 + G_w: the tip's own where nothing else gives way."""
+        tip = self.tip(tooling, omega, spread, stiffness_spread)
+        if self.workpiece_side is None:
+            return tip
+        relative = self.workpiece_side.beside(tip)
+        return relative if spread else replace(relative, variation=None)
 
     def check_behind_joint(self, axes: Sequence[Dof] | None = None) -> None:
         """Refuse a machine that does not tell the spindle's own motion behind the joint, where a sensor at the flange looks.

@@ -31,7 +31,9 @@ def tips_over_speed(
     spread: bool = True,
     stiffness_spread: float = STIFFNESS_SPREAD,
 ) -> Iterator[tuple[NDArray[np.intp], UncertainReceptance | TipModes]]:
-    """Yield the tip for each block of speeds that share one, beside the places of these speeds; blocks that lie far apart come first.
+    """Yield the tip, relative to the workpiece, for each block of speeds that share one, beside the places of these speeds.
+
+    Blocks that lie far apart come first.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ def tips_over_speed(
     for model, places in machine.models(speeds):
         own, known = speeds[places], model.speed_range
         if known is None:
-            yield places, model.tip(tooling, omega, spread, stiffness_spread)
+            yield places, model.relative_tip(tooling, omega, spread, stiffness_spread)
             continue
         blocks = _blocks(own, known)
         tips = _ChangingTip(model, tooling, omega, own, known, spread, stiffness_spread)
@@ -89,7 +91,7 @@ class _ChangingTip:
             self.tips = [self._tip(speed, True) for speed in self.anchors.tolist()]
 
     def _tip(self, speed: float, spread: bool) -> UncertainReceptance | TipModes:
-        return self.model.at(speed).tip(self.tooling, self.omega, spread, self.stiffness_spread)
+        return self.model.at(speed).relative_tip(self.tooling, self.omega, spread, self.stiffness_spread)
 
     def middle(self, speeds: FloatArray) -> float:
         """Return the middle of a block's speeds, as far as they are known."""

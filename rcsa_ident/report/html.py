@@ -33,6 +33,7 @@ from rcsa_ident.report.summaries import (
     two_digits,
     whole_mode_rows,
 )
+from rcsa_ident.report.workpiece_side import side_captions, side_mode_rows
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice
 from rcsa_ident.units import to_hz, to_rpm
@@ -129,6 +130,7 @@ def report_html(
         moved="housing" if says(found.reasons, IdentificationCode.HOUSING_ALONE) else "flange",
         scales=coefficient_rows(found.coefficients),
         drawings=drawing_rows(found.learned),
+        side=None if found.workpiece_side is None else (list(side_mode_rows(found.workpiece_side)), side_captions(found.workpiece_side)),
         has_std=bool(deviations),
         softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values())
         or (found.whole is not None and found.whole.best.layout.softening),

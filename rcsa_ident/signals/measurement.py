@@ -20,8 +20,8 @@ from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, followed, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.listening import heard_in_a_cut
-from rcsa_ident.signals.motion import measured_axes, motion_channels
-from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
+from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import SteadyRecord, steady_record
 from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, examined, raw_faults, silence, smeared, speed_faults, tooth_count_fault
 from rcsa_ident.units import to_hz
@@ -65,6 +65,8 @@ class CutMeasurement:
         By which the spindle speed changes, in the window of a pass: the lines are means over the frequencies that it sweeps.
     length : float [s]
         Of that window; 0 of a whole record.
+    workpiece : mapping of Dof to AxisLines
+        What accelerometers on table or workpiece show, over the force on the tool: minus what gives way there.
     """
 
     cut_id: str
@@ -78,6 +80,7 @@ class CutMeasurement:
     clamping: str = ""
     acceleration: float = 0.0
     length: float = 0.0
+    workpiece: Mapping[Dof, AxisLines] = field(default_factory=dict)
 
     @property
     def housing(self) -> bool:
@@ -160,7 +163,7 @@ def measure_cut(
     """
     axes = measured_axes(cut.sensors)
     if not axes:
-        raise InputError("sensors", "no displacement", _MOTION, cut_id)
+        raise InputError("sensors", nothing_of_the_spindle(cut.sensors), _MOTION, cut_id)
     if air is not None:
         _same_sensors(cut, air, axes)
     programmed, looked_at = conditions.spindle_speed, examined(cut)
@@ -205,9 +208,17 @@ def measure_cut(
         return left_out(reasons, *found)
     kept = cross_lines(steady, still, angle, harmonic, cutter, conditions, coefficients, estimator)
     speed = steady.spindle_speed
-    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)))
+    trigger = trigger_delay(cut, speed, cutter.teeth, *followed(steady))
+    felt = workpiece_lines(steady, still, angle, harmonic, cutter, conditions, coefficients)
+    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger, workpiece=felt)
     verdict = Verdict((), (*notes, HOUSING) if steady.housing else notes if air is not None else (*notes, NO_AIR))
     return Reading(cut_id, tooling, programmed, verdict, (measurement,), *found)
+
+
+def nothing_of_the_spindle(sensors: Sequence[Sensor]) -> str:
+    """Return what is found where no sensor shows the spindle's motion, in words."""
+    felt = workpiece_channels(sensors)
+    return "no displacement" if felt is None else f"{felt.sensors[0].name} on the {felt.sensors[0].role}, and none on the spindle"
 
 
 def _same_sensors(cut: Recording, air: Recording, axes: Sequence[Dof]) -> None:
@@ -258,6 +269,30 @@ def cross_lines(
     return {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
 
 
+def workpiece_lines(
+    steady: SteadyRecord,
+    still: SteadyRecord | None,
+    angle: float,
+    harmonic: np.ndarray,
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+) -> dict[Dof, AxisLines]:
+    """Return the lines of accelerometers on table and workpiece over the simulated force on the tool; parameters as in `cross_lines`.
+
+    Nothing turns there: an air cut's lines are noise, and are subtracted only where one of those at the teeth's orders is not.
+    """
+    channels = workpiece_channels(steady.recording.sensors)
+    if channels is None:
+        return {}
+    air = None
+    if still is not None and workpiece_channels(still.recording.sensors) == channels:
+        beside = still.seen_by(channels)
+        own = harmonic[harmonic <= beside.highest_order]
+        air = beside if any(_visible(beside, own).values()) else None
+    return cross_lines(steady.seen_by(channels), air, angle, harmonic, cutter, conditions, coefficients)
+
+
 def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
 
@@ -276,7 +311,7 @@ def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingCond
     """
     axes, programmed = measured_axes(air.sensors), conditions.spindle_speed
     if not axes:
-        raise InputError("sensors", "no displacement", _MOTION)
+        raise InputError("sensors", nothing_of_the_spindle(air.sensors), _MOTION)
     looked_at = examined(air)
     if not looked_at.usable:
         return Reading(cut_id, tooling, programmed, looked_at)
@@ -318,7 +353,11 @@ def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[Remark, ...]
 
 def visible_harmonics(steady: SteadyRecord) -> dict[Dof, int]:
     """Return how many multiples of the tooth-passing frequency are no noise, for each axis."""
-    order = np.arange(steady.teeth, steady.highest_order + 1, steady.teeth)
+    return _visible(steady, np.arange(steady.teeth, steady.highest_order + 1, steady.teeth))
+
+
+def _visible(steady: SteadyRecord, order: np.ndarray) -> dict[Dof, int]:
+    """How many lines of these orders are no noise, for each axis."""
     ratio = np.abs(steady.flange[order]) ** 2 / np.maximum(2.0 * steady.variance[order], 1e-300)
     # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
     count = np.sum(ratio > np.log(max(order.size, 1)) + 7.0, axis=0)

@@ -188,3 +188,30 @@ def motion_channels(sensors: Sequence[Sensor], axes: Sequence[Dof], housing: boo
             raise InputError("sensors", f"no displacement {axis.upper()}", "the same sensors for a cut and its air cut")
     chosen = [*(sensor for sensor in shown if sensor is not None), *(sensor for each in (*fixed, *felt) for sensor in each)]
     return MotionChannels(tuple(axes), tuple(sensors.index(sensor) for sensor in chosen), tuple(chosen), sum(len(each) for each in fixed))
+
+
+def workpiece_channels(sensors: Sequence[Sensor]) -> MotionChannels | None:
+    """Return the channels of the accelerometers on table and workpiece, one for each axis; None where there are none.
+
+    They are moved by the force on the workpiece, which is minus that on the tool: what they show has nothing of the spindle's motion.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+        One of each column of a recording.
+
+    Raises
+    ------
+    InputError
+        If an axis has several, or if some are turned and cannot be turned back.
+    """
+    chosen = []
+    for axis in (Dof.X, Dof.Y):
+        own = [sensor for role in (Role.WORKPIECE, Role.TABLE) for sensor in accelerometers(sensors, axis, role)]
+        if len(own) > 1:
+            found = f'"{own[1].role}", as well as {own[0].name} on the {own[0].role} along {axis.upper()}'
+            allowed = "one accelerometer on table or workpiece for each axis: leave out those that are farther from the cut"
+            raise InputError(f"sensors.{own[1].name}.role", found, allowed)
+        chosen += own
+    axes = tuple(sensor.axis for sensor in chosen if sensor.axis is not None)
+    return MotionChannels(axes, tuple(sensors.index(sensor) for sensor in chosen), tuple(chosen), 0) if chosen else None

@@ -114,6 +114,17 @@ class SteadyRecord:
         """Samples of the axes' own channels in the steady part, shape (n, axes) [m], those of a housing [m/s^2]."""
         return self.recording.samples[self.part][:, self.channels.columns[: len(self.axes)]]
 
+    def seen_by(self, channels: MotionChannels) -> SteadyRecord:
+        """Return the same part of the recording, as other channels of it show it: accelerometers at another place."""
+        rate = self.recording.rate
+        samples = self.recording.samples[self.part][:, channels.columns]
+        # every line of an acceleration, as in `steady_record`
+        every = line_spectrum(samples, rate, self.spindle_speed, rate, self.deviation)
+        kept = slice(self.highest_order + 1)
+        lines = replace(every, amplitude=every.amplitude[kept], variance=every.variance[kept], scatter=every.scatter[kept])
+        lines = _from_first_sample(lines, self.part, rate)
+        return record_of_lines(self.recording, channels, self.window, self.part, self.teeth, lines, self.deviation, self.rotation)
+
     def segments(self, order: np.ndarray, count: int) -> ComplexArray:
         """Return the absolute displacement in half-overlapping Hann segments, shape (count, orders, axes) [m]."""
         samples = self.recording.samples[self.part][:, self.channels.columns]
@@ -184,10 +195,16 @@ def steady_record(
     highest = rate if accelerations or channels.beside else max_frequency
     lines = line_spectrum(samples[steady], rate, speed, highest, deviation).up_to(max_frequency)
     part = slice(window.start + steady.start, window.start + steady.stop)
-    if part.start:
-        shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * speed * part.start / rate)
-        lines = replace(lines, amplitude=lines.amplitude * shift[:, None])
+    lines = _from_first_sample(lines, part, rate)
     return record_of_lines(recording, channels, window, part, teeth, lines, deviation, rotation)
+
+
+def _from_first_sample(lines: LineSpectrum, part: slice, rate: float) -> LineSpectrum:
+    """Lines of a part with their phases from the recording's first sample."""
+    if not part.start:
+        return lines
+    shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * lines.spindle_speed * part.start / rate)
+    return replace(lines, amplitude=lines.amplitude * shift[:, None])
 
 
 def record_of_lines(

@@ -27,7 +27,7 @@ from rcsa_ident.signals.measurement import (
     cut_faults,
     visible_harmonics,
 )
-from rcsa_ident.signals.motion import motion_channels
+from rcsa_ident.signals.motion import motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording
 from rcsa_ident.signals.rotation import Pace, follow, speed_path
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum
@@ -61,6 +61,8 @@ _LEAST_USABLE = 0.5
 
 #: Note on a pass with accelerometers on the housing beside displacement sensors.
 UNUSED = Remark(RecordCode.HOUSING, "the accelerometers on the spindle's housing are not used in a pass whose speed changes")
+#: The same of accelerometers on table or workpiece.
+WORKPIECE_UNUSED = Remark(RecordCode.WORKPIECE, "the accelerometers on table or workpiece are not used in a pass whose speed changes")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,6 +161,8 @@ def measure_pass(
     notes = looked_at.notes
     if motion_channels(cut.sensors, axes).beside:
         notes = (*notes, UNUSED)
+    if workpiece_channels(cut.sensors) is not None:
+        notes = (*notes, WORKPIECE_UNUSED)
 
     def left_out(*reasons: Remark) -> Reading:
         return Reading(cut_id, tooling, programmed, Verdict(reasons, notes))

@@ -52,6 +52,7 @@ class RecordCode(StrEnum):
     LONG = "long"
     FOLLOWED = "followed"
     HOUSING = "housing"
+    WORKPIECE = "workpiece"
     CLOCK = "clock"
     NO_AIR_CUT = "no-air-cut"
     LOSSY = "lossy"

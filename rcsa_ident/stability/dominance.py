@@ -26,6 +26,7 @@ _HELP = {
     Doubted.LENGTHS: "measure the stickout with a presetter",
     Doubted.HOLDER: "tap it, ring it or cut once",
     Doubted.STIFFNESS: "tap it or cut once",
+    Doubted.WORKPIECE: "tap the workpiece where it is cut, or record more cuts",
     Doubted.COEFFICIENTS: "calibrate them on a dynamometer",
     Doubted.MACHINE: "more cuts narrow it",
 }

@@ -15,6 +15,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual._kernels import mill
 from rcsa_ident.virtual.reduction import Poles
+from rcsa_ident.virtual.workpiece_side import WORKPIECE
 
 #: Harmonics of the spindle from which the state at the start is built.
 _START_ORDERS = 512
@@ -51,9 +52,9 @@ class CutHistory:
     force : array, shape (n, 2) [N]
         Force on the tool, machine axes X and Y.
     tip, flange, fixture : arrays, shape (n, 2) [m]
-        Absolute displacements, X and Y.
+        Absolute displacements, X and Y; the tip's is relative to the workpiece where that gives way, too.
     acceleration : array, shape (n, 2 + 2 h) [m/s^2]
-        Acceleration of the fixture, then of each of h further points of the housing, X and Y.
+        Acceleration of the fixture, then of each of h further points, of the housing and last of the workpiece, X and Y.
     """
 
     step: float
@@ -90,7 +91,7 @@ def mill_cut(
     ----------
     dynamics : Poles, or a sequence of them
         The machine with inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``, and ``housing1``, ``housing2``, ...
-        where further accelerometers stand; of one that changes while it cuts, one
+        and ``workpiece`` where further accelerometers stand; of one that changes while it cuts, one
         for each of equal parts of the cut, in the same order and scale (`reduction.alike`).
     cutter : Cutter
     conditions : CuttingConditions
@@ -133,9 +134,9 @@ def mill_cut(
     gain = step * np.stack([first - second, second], axis=1)[:, :, :, None] * np.stack([part.inputs for part in parts])[:, None]
     names = [str(c) for c in dynamics.coordinates]
     rows = [names.index(f"{point}.{axis}") for point in ("tip", "flange", "fixture") for axis in "xy"]
-    felt = rows[4:] + [k for k, name in enumerate(names) if name.startswith("housing") and "'" not in name]
+    felt = rows[4:] + [k for k, name in enumerate(names) if name.startswith(("housing", WORKPIECE)) and "'" not in name]
     shape = 2.0 * np.stack([np.concatenate([part.outputs[rows], part.outputs[felt] * part.pole**2]) for part in parts])
-    # a force at the tip accelerates the housing at once only through what the basis leaves out
+    # a force at the tip accelerates the workpiece at once, the housing only through what the basis leaves out
     through = 2.0 * (dynamics.outputs[felt] * dynamics.pole) @ dynamics.inputs
 
     force = np.zeros((count, 2))

@@ -235,9 +235,11 @@ def trigger_pulse(angle: FloatArray, edge: float, width: float = 0.35) -> FloatA
     return (np.mod(angle - edge, 2.0 * np.pi) < width).astype(float)
 
 
-def accelerometer_places(housing: int) -> tuple[str, ...]:
-    """Return what the channels of accelerometers begin with: those of the fixture, then those of so many pairs on the housing."""
-    return ("fixture", "housing", *(f"housing{k}" for k in range(2, housing + 1)))[: 1 + housing]
+def accelerometer_places(housing: int, workpiece_side: str | None = None) -> tuple[str, ...]:
+    """Return what the channels of accelerometers begin with: of the fixture, of so many pairs on the housing, then of what is told of the
+    workpiece's side."""
+    places = ("fixture", "housing", *(f"housing{k}" for k in range(2, housing + 1)))[: 1 + housing]
+    return places if workpiece_side is None else (*places, workpiece_side)
 
 
 def record(
@@ -249,7 +251,7 @@ def record(
     history: CutHistory | None,
     rng: np.random.Generator,
     disturbances: Disturbances = UNDISTURBED,
-    housing: int = 0,
+    places: tuple[str, ...] = ("fixture",),
 ) -> dict[str, FloatArray]:
     """Return the channels of one record, in the sensors' signal units, shape (count,) each.
 
@@ -268,13 +270,13 @@ def record(
     rng : numpy.random.Generator
     disturbances : Disturbances
         What is added; how the spindle turns is in the angle.
-    housing : int
-        Pairs of accelerometers on the housing, beside that on the sensors' fixture; each is as that one.
+    places : tuple of str
+        Of the pairs of accelerometers (`accelerometer_places`); each is as that on the sensors' fixture.
     """
     count = angle.size
     speed = float(angle[-1] - angle[0]) / (count - 1) * suite.rate
     gap = out_of_round(suite, clamping, angle - feed_angle, speed, factor)
-    acceleration = np.zeros((count, 2 * (1 + housing)))
+    acceleration = np.zeros((count, 2 * len(places)))
     if history is not None:
         step = 1.0 / (suite.rate * factor)
         fine = (count - 1 + 2 * padding(factor)) * factor + 1
@@ -285,13 +287,13 @@ def record(
             gap[:, i] += sample(relative[:, i], factor, step, suite.gap_delay, suite.gap_bandwidth)
         for i, felt in enumerate(history.acceleration.T):
             acceleration[:, i] += sample(felt, factor, step, suite.acceleration_delay, suite.acceleration_bandwidth)
-    for channel, more in zip((gap, acceleration), disturbed(disturbances, suite.rate, count, rng, 1 + housing), strict=True):
+    for channel, more in zip((gap, acceleration), disturbed(disturbances, suite.rate, count, rng, len(places)), strict=True):
         channel += more
     channels: dict[str, FloatArray] = {}
     for i, axis in enumerate("xy"):
         seen = gap[:, i] + suite.gap_noise * rng.normal(size=count) + drift(suite.gap_drift, count, rng)
         channels[f"flange_{axis}"] = suite.gap_sensitivity * seen
-    for place, pair in zip(accelerometer_places(housing), np.split(acceleration, 1 + housing, axis=1), strict=True):
+    for place, pair in zip(places, np.split(acceleration, len(places), axis=1), strict=True):
         for i, axis in enumerate("xy"):
             seen = pair[:, i] + suite.acceleration_noise * rng.normal(size=count)
             channels[f"{place}_{axis}"] = suite.acceleration_sensitivity * seen

@@ -21,6 +21,7 @@ from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.identification.rough_data import with_cross_talk, with_rough_toolings, with_scales
+from rcsa_ident.identification.workpiece_side import workpiece_side
 from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
@@ -170,7 +171,7 @@ def identify(
     InputError
         If no cut is usable, and there is no hammer test.
     """
-    found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign)
+    found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings)
     clock = clock_remark(readings)
     return found if clock is None else replace(found, notes=(*found.notes, clock))
 
@@ -213,13 +214,17 @@ def clock_remark(readings: Sequence[Reading]) -> Remark | None:
     return Remark(RecordCode.CLOCK, words)
 
 
-def of_campaign(found: Identification, campaign: Campaign) -> Identification:
-    """Return the identification with what its machine has to know of the campaign, what is unusual about that, and shapes of cutters."""
+def of_campaign(found: Identification, campaign: Campaign, readings: Sequence[Reading] = ()) -> Identification:
+    """Return the identification with what its machine has to know of the campaign, what is unusual about that, and shapes of cutters; and
+    with what gives way on the workpiece's side, where the readings tell it.
+    """
+    side, told = workpiece_side(found, [each for reading in readings for each in reading.measurements], campaign.sensors)
     exact = () if found.toolings is not None or not campaign.rough else (Remark(IdentificationCode.DRAWINGS_EXACT, DRAWINGS_EXACT),)
-    notes = tuple(dict.fromkeys((*found.notes, *exact, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
+    notes = tuple(dict.fromkeys((*found.notes, *exact, *told, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
     drawings = {name: tooling.drawing for name, tooling in campaign.toolings.items()}
-    told = () if found.toolings is None else learned(found.toolings, drawings)
-    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=told)
+    values = () if found.toolings is None else learned(found.toolings, drawings)
+    known = replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=values)
+    return replace(known, workpiece_side=side)
 
 
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:

@@ -75,7 +75,7 @@ def believed_of_tap_test(tip: Receptance, coefficients: CuttingCoefficients) -> 
 
 def believed_of_machine(machine: TipSource, tooling: Tooling, coefficients: CuttingCoefficients, stiffness_spread: float) -> Believed:
     """Return what an identification says of a tooling's tip, in the middle of its speeds, its posterior told as that of the tip's modes."""
-    tip = machine.at(None).tip(tooling, None, True, stiffness_spread)
+    tip = machine.at(None).relative_tip(tooling, None, True, stiffness_spread)
     if isinstance(tip, TipModes) or not isinstance(tip, UncertainReceptance) or not tip.complete:
         raise InputError("result", "a machine without a posterior", "an identification, modes with their spreads, or tap tests of the tip")
     t, r = coefficients.tangential_spread, coefficients.ratio_spread

@@ -18,7 +18,8 @@ from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
 from rcsa_ident.virtual.milling import Course, CutHistory, mill_cut, synchronous_lines
 from rcsa_ident.virtual.reduction import Poles, ReducedRotor, alike, poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor
-from rcsa_ident.virtual.sensors import Clamping, SensorSuite, clamp, padding, record
+from rcsa_ident.virtual.sensors import Clamping, SensorSuite, accelerometer_places, clamp, padding, record
+from rcsa_ident.virtual.workpiece_side import VirtualWorkpieceSide
 
 #: Instants of the time march per sample of the records.
 OVERSAMPLING = 8
@@ -45,6 +46,9 @@ class VirtualSetup(Protocol):
 
     @property
     def disturbances(self) -> Disturbances: ...
+
+    @property
+    def workpiece_side(self) -> VirtualWorkpieceSide | None: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +81,7 @@ def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: M
 
 
 def true_receptances(setup: VirtualSetup, tooling: Tooling, speed: float | None = None) -> TrueReceptances:
-    """Return tip-tip and flange-tip from the full equations.
+    """Return tip-tip and flange-tip from the full equations: the tool's own, whatever gives way on the workpiece's side.
 
     Parameters
     ----------
@@ -121,6 +125,7 @@ def _jobs(setup: VirtualSetup, toolings: Sequence[Tooling], rng: np.random.Gener
         dynamics = None if setup.spindle.speed_dependent else poles(small)
         for name, speed, last, duration in setup.plan.cuts:
             own = _along(small, speed, last, setup.plan.settling / duration) if dynamics is None else dynamics
+            own = _with(setup.workpiece_side, own)
             conditions = setup.plan.conditions(speed)
             yield _Job(f"{tooling.name}-{name}", tooling, own, clamping, conditions, last, duration, chance.spawn(1)[0])
 
@@ -135,6 +140,13 @@ def _along(small: ReducedRotor, speed: float, last: float | None, settling: floa
     for share in gone[1:].tolist():
         found.append(alike(found[-1], poles(small, speed + share * (last - speed))))
     return tuple(found)
+
+
+def _with(side: VirtualWorkpieceSide | None, dynamics: Poles | tuple[Poles, ...]) -> Poles | tuple[Poles, ...]:
+    """The machine with what gives way on the workpiece's side."""
+    if side is None:
+        return dynamics
+    return side.under(dynamics) if isinstance(dynamics, Poles) else tuple(side.under(each) for each in dynamics)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,7 +184,8 @@ class _Worker:
                 highest = int(2.0 * np.pi * TRUTH_FREQUENCIES[1] / speed)
                 lines = _lines(plan, history, lead, highest + 1)
             own = suite, job.clamping, angle[inside], job.conditions.feed_angle, OVERSAMPLING, history, job.rng, disturbances
-            channels = record(*own, len(self.setup.spindle.housing_positions))
+            side = self.setup.workpiece_side
+            channels = record(*own, accelerometer_places(len(self.setup.spindle.housing_positions), None if side is None else side.role))
             speed = float(np.mean(np.diff(angle[inside]))) * suite.rate if disturbances.speed_wander > 0.0 or change != 0.0 else speed
             records[kind] = SimulatedRecord(speed, start, channels)
         return SimulatedCut(job.id, job.tooling.name, records, lines)

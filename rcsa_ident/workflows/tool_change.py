@@ -82,6 +82,7 @@ def tooltip(
     speed: float | None = None,
     spread: bool = True,
     stiffness_spread: float = STIFFNESS_SPREAD,
+    relative: bool = False,
 ) -> TipAnswer:
     """Return the tip's receptance of a tooling on a machine.
 
@@ -96,8 +97,11 @@ def tooltip(
         With what the records leave open.
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
+    relative : bool
+        Relative to the workpiece, as limits are computed from; by default the tool's own.
     """
-    tip = machine.at(speed).tip(tooling, omega, spread, stiffness_spread)
+    here = machine.at(speed)
+    tip = (here.relative_tip if relative else here.tip)(tooling, omega, spread, stiffness_spread)
     if isinstance(tip, TipModes):
         lines = tip.receptance().omega if omega is None else omega
         tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
@@ -439,7 +443,7 @@ def _modes_above(machine: TipSource, tooling: Tooling, omega: FloatArray) -> lis
     above = np.arange(top, ABOVE * top, _ABOVE_STEP)
 
     def tip(at: FloatArray) -> Receptance:
-        found = source.tip(tooling, at, spread=False)
+        found = source.relative_tip(tooling, at, spread=False)
         assert not isinstance(found, TipModes)
         return found
 

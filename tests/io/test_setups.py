@@ -380,6 +380,19 @@ def test_what_an_accelerometer_is_fixed_to(campaign, campaign_text):
         read_campaign(campaign)
 
 
+def test_two_accelerometers_on_the_workpieces_side_of_one_axis_are_refused(campaign, campaign_text):
+    more = "".join(
+        f'[sensors.{name}]\nquantity = "acceleration"\naxis = "X"\nsensitivity = 1.0\nrole = "{role}"\n'
+        for name, role in (("on_table", "table"), ("on_part", "workpiece"))
+    )
+    told = campaign_text.replace("[sensors.fixture_x]\n", '[sensors.fixture_x]\nrole = "fixture"\n')
+    (campaign / "campaign.toml").write_text(told.replace("[sensors.trigger]", f"{more}[sensors.trigger]"))
+    words = r'sensors.on_table.role: found "table", as well as on_part on the workpiece along X, allowed is one accelerometer on table or'
+    with pytest.raises(InputError, match=words) as error:
+        read_campaign(campaign)
+    assert "campaign.toml" in str(error.value)
+
+
 def test_a_clock_that_is_off(campaign, campaign_text):
     assert read_campaign(campaign).clock_error == 0.0
     (campaign / "campaign.toml").write_text(campaign_text.replace("[campaign]\n", "[campaign]\nclock_error_percent = 0.1\n"))

@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
-from rcsa_ident.signals.sweep import UNUSED, judge_pass_air
+from rcsa_ident.signals.sweep import UNUSED, WORKPIECE_UNUSED, judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode
 from tests.fixtures.virtual_pass import AXES, CONSTANT, RPM, SECONDS, SPEEDS, Pass
 
@@ -150,15 +150,17 @@ def test_one_axis_is_enough(plain):
         assert np.all(np.abs(ratio - 1.0) < 3.0 * np.hypot(noise, here.alignment_std * lines.order))
 
 
-def test_accelerometers_on_the_housing_are_not_used_and_that_is_said(plain):
+@pytest.mark.parametrize(("role", "words"), [(Role.SPINDLE, UNUSED), (Role.TABLE, WORKPIECE_UNUSED)])
+def test_accelerometers_on_housing_or_table_are_not_used_and_that_is_said(plain, role, words):
     def beside(recording):
         fixed = tuple(replace(s, role=Role.FIXTURE) if s.quantity is Quantity.ACCELERATION else s for s in recording.sensors)
-        felt = tuple(Sensor(f"rear_{axis}", Quantity.ACCELERATION, axis, role=Role.SPINDLE) for axis in AXES)
+        felt = tuple(Sensor(f"rear_{axis}", Quantity.ACCELERATION, axis, role=role) for axis in AXES)
         noise = np.random.default_rng(3).normal(size=(recording.samples.shape[0], 2))
         return Recording(recording.rate, np.hstack([recording.samples, noise]), (*fixed, *felt))
 
     found = plain.measure(cut=beside(plain.cut), air=beside(plain.air))
-    assert [str(note) for note in found.verdict.notes] == [str(UNUSED)]
+    assert [str(note) for note in found.verdict.notes] == [str(words)]
+    assert all(not each.workpiece for each in found.measurements)
     for here, there in zip(found.measurements, plain.measure().measurements, strict=True):
         for axis, lines in here.axes.items():
             np.testing.assert_array_equal(lines.cut, there.axes[axis].cut)

@@ -7,7 +7,17 @@ from hypothesis import strategies as st
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual.milling import CutHistory
-from rcsa_ident.virtual.sensors import UNDISTURBED, SensorSuite, clamp, decimator, out_of_round, padding, record, sample
+from rcsa_ident.virtual.sensors import (
+    UNDISTURBED,
+    SensorSuite,
+    accelerometer_places,
+    clamp,
+    decimator,
+    out_of_round,
+    padding,
+    record,
+    sample,
+)
 
 RATE, FACTOR = 25600.0, 8
 FINE = 1.0 / (RATE * FACTOR)
@@ -103,7 +113,7 @@ def test_pairs_on_the_housing_have_channels_of_their_own():
     angle = turned(suite, 900.0, 0.2, 256)
 
     def channels(history, housing):
-        return record(suite, clamping, angle, 0.0, FACTOR, history, np.random.default_rng(1), UNDISTURBED, housing)
+        return record(suite, clamping, angle, 0.0, FACTOR, history, np.random.default_rng(1), UNDISTURBED, accelerometer_places(housing))
 
     few, many = channels(plain, 0), channels(dataclasses.replace(plain, acceleration=felt), 2)
     assert set(many) - set(few) == {"housing_x", "housing_y", "housing2_x", "housing2_y"}

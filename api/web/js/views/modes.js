@@ -59,8 +59,35 @@ const columns = (band) => [
   { name: "Damping", unit: "%", number: true, cell: ({ mode }) => withSpread(mode.damping_ratio, mode.damping_ratio_std, 100) },
 ];
 
-/** A card for each axis, or one for both where they feel each other. */
-export function modesCards(modes) {
+/** A card for each axis, or one for both where they feel each other; then what gives way on the workpiece's side, where somebody looked. */
+export const modesCards = (modes) => [...spindleCards(modes), ...workpieceCard(modes)];
+
+const SIDE = [
+  { name: "Axis", cell: ({ axis }) => axis },
+  ...[
+    ["Frequency", "Hz", "natural_frequency_hz", "natural_frequency_std_hz", 1],
+    ["Damping", "%", "damping_ratio", "damping_ratio_std", 100],
+    ["Stiffness", "N/µm", "stiffness_n_per_m", "stiffness_std_n_per_m", 1e-6],
+  ].map(([name, unit, key, std, times]) => ({ name, unit, number: true, cell: ({ mode }) => withSpread(mode[key], mode[std], times) })),
+];
+
+function workpieceCard(modes) {
+  const axes = Object.entries(modes.workpiece_side ?? {});
+  if (!axes.length) return [];
+  const rows = axes.flatMap(([axis, found]) => found.modes.map((mode) => ({ axis, mode })));
+  const seen = ([axis, { sensor, role, lines, modes }]) =>
+    `${axis}: ${sensor} on the ${role}, ${lines} lines${modes.length ? "" : ", nothing above the noise"}.`;
+  return [
+    card(
+      "Workpiece's side of the cut",
+      null,
+      rows.length ? table("Modes of the workpiece's side", SIDE, rows) : null,
+      h("p", { class: "small soft" }, axes.map(seen).join(" "), " Lobes hold for tool and workpiece together, a tip FRF is the tool's alone."),
+    ),
+  ];
+}
+
+function spindleCards(modes) {
   if (modes.both_planes) return [togetherCard(modes)];
   const cards = Object.entries(modes.axes).map(([axis, found]) => {
     const rows = found.modes.map((mode, i) => ({ mode, i }));
