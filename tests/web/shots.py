@@ -92,6 +92,7 @@ def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable
         dropped(page, folder, "S9-shop")
 
     def exact(page: Page) -> None:
+        page.get_by_text("Material, spindle, method").click()
         page.get_by_label("Method", exact=True).select_option("full-discretisation")
         page.wait_for_timeout(1500)
 
