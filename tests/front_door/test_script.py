@@ -18,7 +18,7 @@ machine = found.machine
 tool = ri.read_tooling("data/machines/toolings/S3-PG25-long.toml")
 
 tip = machine.tip(tool)
-cut = ri.MillingProcess(tool.cutter, campaign.workpiece.coefficients, ri.Engagement.from_immersion(0.5, "down"))
+cut = ri.MillingProcess(tool.cutter, machine.workpiece.coefficients, ri.Engagement.from_immersion(0.5, "down"))
 lobes = ri.stability_lobes(tip, cut, ri.rpm(4000, 20_000, 50), max_depth=10e-3, method=ri.ZeroOrder())
 
 print(lobes.best_speeds()[0])
@@ -35,7 +35,7 @@ def test_as_it_stands(triggered):
     (folder / "script.py").write_text(code)
     done = subprocess.run([sys.executable, "script.py"], cwd=folder, capture_output=True, text=True, check=True)
     pocket, answer, forces = done.stdout.splitlines()
-    assert pocket == "14550 rev/min: stability limit 2.03 mm, recommended 1.69 mm"
+    assert pocket == "14550 rev/min: stability limit 2.03 mm, recommended 1.68 mm"
     assert answer.startswith("converged, 16 cuts, X ")
     assert "N rms" in forces
     assert done.stderr == ""

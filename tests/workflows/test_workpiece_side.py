@@ -35,7 +35,11 @@ from tests.fixtures.paths import MACHINES
 
 HZ = 2.0 * np.pi
 SPEEDS = np.linspace(600.0, 1400.0, 9)
-HALF = CutSpec(Engagement(0.5 * np.pi, np.pi), feed_per_tooth=1e-4, coefficients={"tangential": 9e8, "radial_ratio": 0.26})
+HALF = CutSpec(
+    Engagement(0.5 * np.pi, np.pi),
+    feed_per_tooth=1e-4,
+    coefficients={"tangential": 9e8, "radial_ratio": 0.26, "tangential_spread": 0.0, "ratio_spread": 0.0},
+)
 
 
 def soft(sensor, hertz):

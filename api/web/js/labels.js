@@ -1,7 +1,7 @@
 // Labels in a chart that do not cover each other: the more important ones first, each a step higher where its place is taken.
 
 /** Width of a figure and height of a line, as shares of the letters' size [px]; lines that a label may climb. */
-const [WIDE, HIGH, CLIMBS] = [0.62, 1.35, 4];
+const [WIDE, HIGH, CLIMBS] = [0.65, 1.45, 4];
 
 /**
  * The labels that find a place, each with its `shift` upwards [px] from its point; the first one always finds one.

@@ -131,7 +131,7 @@ export function reserve(found, question, pocket = null) {
   return h(
     "p",
     { class: "soft small reserve" },
-    `The recommended depth is 10 % below the stability limit${banded ? " that 95 % of the possible machines and cutting coefficients reach" : ""}, with the speed right within 1 %.${computedBy(found)}`,
+    `The recommended depth is 10 % below the stability limit${banded ? " that holds with a probability of 95 %" : ""}, with the speed right within 1 %.${computedBy(found)}`,
     pocket ? [` Highest stability limit: ${plain(pocket.spindle_speed_rpm)} rev/min, `, limitOf(pocket, question), "."] : null,
   );
 }

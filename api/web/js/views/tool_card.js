@@ -66,7 +66,7 @@ function sheet({ name, machine, keys, question, found, software, versions }) {
   const { cut, speeds } = question;
   const [ofTooling, ofMachine] = versions;
   // a flange that was measured is taken for exact
-  const ofRecords = machine.identification?.status === "measured" ? "" : " that 95 % of the possible machines and cutting coefficients reach";
+  const ofRecords = machine.identification?.status === "measured" ? "" : " that holds with a probability of 95 %";
   return h(
     "article",
     { class: "card tool-card" },
