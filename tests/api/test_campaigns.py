@@ -374,9 +374,11 @@ def test_a_campaign_that_can_not_be_loaded_says_why(client, machine, store):
 def test_texts_of_campaigns_come_back_as_they_were():
     data = declared(2)
     data["campaign"]["clock_error_percent"] = 0.1
-    data["sensors"]["fixture_x"]["role"] = "fixture"
+    data["sensors"]["fixture_x"]["role"] = data["sensors"]["fixture_y"]["role"] = "fixture"
     data["sensors"]["felt_x"] = {"quantity": "acceleration", "axis": "X", "sensitivity": 1.0, "role": "table", "mount_resonance_hz": 8e3}
+    # turned back by its fellow
     data["sensors"]["felt_x"]["rotation_deg"] = 2.0
+    data["sensors"]["felt_y"] = data["sensors"]["felt_x"] | {"axis": "Y"}
     name, text, cuts = declare(data, lambda _: None)
     assert (name, cuts) == ("by hand", 2)
     assert json.loads(text)["cuts"] == data["cuts"]
