@@ -157,7 +157,7 @@ class ToolCard:
     machine : str
         In words.
     tolerance, probability, reserve : float
-        Shares of speed, of the machines that the records allow, and of depth that the recommended depth keeps.
+        Shares of speed, of the possible machines and cutting coefficients, and of depth that the recommended depth keeps.
     versions : sequence of str
         What it was computed from.
     """

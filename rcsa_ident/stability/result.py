@@ -1,4 +1,4 @@
-"""The answer of every lobe method, with the limits of the machines that the records allow."""
+"""The answer of every lobe method, with the limits of possible machines and cutting coefficients."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 from rcsa_ident.units import to_rpm
 
 _ARRAYS = ("spindle_speed", "limit_depth", "chatter_frequency", "lobe", "flip")
-#: What a recommendation holds back: speed right within this share, stable on this share of the machines that the records allow, and so
+#: What a recommendation holds back: speed right within this share, stable on this share of the possible machines and coefficients, and so
 #: much of that depth kept in reserve.
 TOLERANCE, PROBABILITY, RESERVE = 0.01, 0.95, 0.1
 
@@ -74,7 +74,7 @@ class StabilityLobes(Drawn):
     flip : array of bool, shape (n,), default all False
         Where stability is lost by period doubling (an eigenvalue of -1 per tooth period); elsewhere the vibration is quasi-periodic.
     drawn : array, shape (d, n) [m], or None
-        Limits of machines drawn from what the records leave open.
+        Limits of machines and coefficients drawn from what is left open of them.
     withheld : str
         Why no depth is recommended from these limits; empty where one is.
     """

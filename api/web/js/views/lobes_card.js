@@ -91,7 +91,7 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
     h(
       "p",
       { class: "small soft" },
-      "The line is the stability limit. Shaded around it: where 95 % of the machines lie that the records allow. Diamonds: the highest ",
+      "The line is the stability limit. Shaded around it: where it lies with a probability of 95 %. Diamonds: the highest ",
       "limits. Dot: the recommended cut. Hover for limit, recommended depth and chatter frequency; drag to look closer, double click to come back.",
     ),
     h("div", { class: "reader" }, speed, read),
