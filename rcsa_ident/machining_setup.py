@@ -266,7 +266,7 @@ class Cut(Shown):
                     ("spindle_speed_rpm", SPINDLE_SPEED, c.spindle_speed),
                     ("axial_depth_mm", AXIAL_DEPTH, c.axial_depth),
                     ("feed_per_tooth_mm", FEED_PER_TOOTH, c.feed_per_tooth),
-                    ("radial immersion", IMMERSION, c.engagement.immersion),
+                    *((("radial immersion", IMMERSION, c.engagement.immersion),) if isinstance(c.engagement, Engagement) else ()),
                 )
             )
         )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
@@ -185,7 +186,7 @@ def _groups(found: Calibrated) -> Sequence[MeanForces]:
     groups: dict[tuple[Any, ...], list[Any]] = {}
     for m in found.used:
         c = m.record.conditions
-        angles = (round(a, 6) for a in (c.engagement.entry, c.engagement.exit, c.feed_angle))
+        angles = (round(a, 6) for a in (*same_everywhere(c.engagement).angles, c.feed_angle))
         key = (m.record.clamping, round(c.axial_depth, 9), *angles)
         groups.setdefault(key, []).append(m)
     rows = []

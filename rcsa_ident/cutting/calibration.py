@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.conditions import CuttingConditions, same_everywhere
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, unit_lines
 from rcsa_ident.cutting.regression import cluster_covariance, student_quantile
@@ -106,7 +106,7 @@ def mean_force_matrix(cutter: Cutter, conditions: CuttingConditions) -> FloatArr
     """
     matrix = np.zeros((3, 6))
     matrix[:2, :4] = unit_lines(cutter, conditions, np.array([0]))[0].real
-    entry, exit_ = conditions.engagement.entry, conditions.engagement.exit
+    entry, exit_ = same_everywhere(conditions.engagement).angles
     share = cutter.teeth * conditions.axial_depth / (2.0 * np.pi)
     matrix[2, 4:] = share * conditions.feed_per_tooth * (np.cos(entry) - np.cos(exit_)), share * (exit_ - entry)
     return matrix

@@ -1,36 +1,59 @@
-"""The cutter: teeth, pitch, helix, run-out, and the name of its shape."""
+"""The cutter: teeth, pitch, helix, run-out, and its shape."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.profile import Profile
+from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.cutting.shape import IGNORED_CORNER, CutterShape, cylinder_remark
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 
 
+class HelixKind(StrEnum):
+    """What is constant along an edge: the lead, or the angle between the edge and the axis."""
+
+    LEAD = "lead"
+    ANGLE = "angle"
+
+
+#: Steepest helix [rad].
+_STEEPEST = 0.45 * np.pi
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Cutter(Shown):
-    """A milling cutter, computed as the cylinder of its diameter.
+    """A milling cutter.
 
     Parameters
     ----------
     teeth : int
     diameter : float [m]
-    helix : float [rad], default 0
-        A point of an edge at height z above the tip lags the tip by 2 z tan(helix) / diameter.
+        DC; of a face mill that where the edge meets the floor.
+    helix : float [rad], or array, shape (teeth,), default 0
+        A point of an edge at height z above the tip lags the tip by 2 z tan(helix) / diameter, see `helix_kind`.
     pitch : array, shape (teeth,) [rad], default equal
         `pitch[j]` is the angle from tooth j to tooth j + 1, which runs ahead of it and has cut there before.
     runout : array, shape (teeth,) [m], default none
         Radial offset of each edge.
     shape : CutterShape or its name, default flat
-        What is computed is a cylinder whatever it is; `cylinder_remarks` say so.
+        Without a `profile` what is computed is a cylinder whatever it is; `cylinder_remarks` say so.
     corner_radius : float [m], default 0
         Of the edge's corner, or of its arc where the shape is one; 0 where it is sharp or not known.
+    profile : Profile or None
+        What the edges sweep over; None is the cylinder of the diameter.
+    helix_kind : HelixKind or its name, default lead
+    serration : Serration or None
+    axial_runout : array, shape (teeth,) [m], default none
+        By which each edge stands nearer to the spindle.
+    tilt : float [rad], default 0
+        Of the cutter's axis in the spindle, away from tooth 1: the teeth run out in proportion to the height above the tip.
 
     Examples
     --------
@@ -43,18 +66,22 @@ class Cutter(Shown):
 
     teeth: int
     diameter: float
-    helix: float = 0.0
+    helix: float | FloatArray = 0.0
     pitch: FloatArray = field(default=None)  # type: ignore[arg-type]
     runout: FloatArray = field(default=None)  # type: ignore[arg-type]
     shape: CutterShape = CutterShape.FLAT
     corner_radius: float = 0.0
+    profile: Profile | None = None
+    helix_kind: HelixKind = HelixKind.LEAD
+    serration: Serration | None = None
+    axial_runout: FloatArray = field(default=None)  # type: ignore[arg-type]
+    tilt: float = 0.0
 
     def __post_init__(self) -> None:
         if isinstance(self.teeth, bool) or int(self.teeth) != self.teeth or not 1 <= self.teeth <= 100:
             raise InputError("teeth", self.teeth, "a whole number from 1 to 100")
         positive("diameter", self.diameter, "m")
-        if not 0.0 <= non_negative("helix", self.helix, "rad") < 0.45 * np.pi:
-            raise InputError("helix", self.helix, "0 to 81 degrees")
+        object.__setattr__(self, "helix", self._checked_helix())
         equal = np.full(self.teeth, 2.0 * np.pi / self.teeth)
         pitch = frozen(equal if self.pitch is None else self.pitch)
         runout = frozen(np.zeros(self.teeth) if self.runout is None else self.runout)
@@ -68,9 +95,51 @@ class Cutter(Shown):
         corner = non_negative("corner_radius", self.corner_radius, "m")
         if not shape.has_room(corner, self.diameter):
             raise InputError("corner_radius", corner, f"at most half of the diameter, {0.5 * self.diameter:g} m")
+        axial = frozen(np.zeros(self.teeth) if self.axial_runout is None else self.axial_runout)
+        if axial.shape != (self.teeth,) or not np.all(np.isfinite(axial)):
+            raise InputError("axial_runout", axial.tolist(), f"{self.teeth} finite axial offsets [m]")
+        if not abs(self.tilt) <= 0.02:
+            raise InputError("tilt", self.tilt, "an angle from -0.02 to 0.02 [rad]")
+        if self.helix_kind not in tuple(HelixKind):
+            raise InputError("helix_kind", self.helix_kind, f"one of {', '.join(HelixKind)}")
+        if self.serration is not None and self.serration.shifts(self.teeth).shape != (self.teeth,):
+            raise InputError("serration shift", self.serration.shifts(self.teeth).tolist(), f"{self.teeth} shares of the wavelength")
+        object.__setattr__(self, "helix_kind", HelixKind(self.helix_kind))
+        object.__setattr__(self, "axial_runout", axial)
         object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "pitch", pitch)
         object.__setattr__(self, "runout", runout)
+
+    def _checked_helix(self) -> float | FloatArray:
+        """A number where all teeth have the same helix."""
+        if np.ndim(self.helix) == 0:
+            if not 0.0 <= non_negative("helix", float(self.helix), "rad") < _STEEPEST:
+                raise InputError("helix", self.helix, "0 to 81 degrees")
+            return float(self.helix)
+        each = frozen(self.helix)
+        if each.shape != (self.teeth,) or not np.all((each >= 0.0) & (each < _STEEPEST)):
+            raise InputError("helix", np.degrees(each).tolist(), f"one angle, or {self.teeth} of them, 0 to 81 degrees")
+        return each if np.ptp(each) > 0.0 else float(each[0])
+
+    @property
+    def helices(self) -> FloatArray:
+        """Helix of each tooth, shape (teeth,) [rad]."""
+        return np.full(self.teeth, self.helix)
+
+    @property
+    def is_cylinder(self) -> bool:
+        """True where everything along the edges is constant but their lag, which all teeth have in common: closed forms are for it."""
+        return self.profile is None and self.serration is None and self.tilt == 0.0 and np.ndim(self.helix) == 0
+
+    @property
+    def outline(self) -> Profile:
+        """What the edges sweep over."""
+        return Profile.flat(self.diameter) if self.profile is None else self.profile
+
+    @property
+    def largest_lag(self) -> float:
+        """By which the edge lags the tip per height, of the steepest tooth [rad/m]."""
+        return 2.0 * float(np.max(np.tan(self.helices))) / self.diameter
 
     @property
     def tooth_angle(self) -> FloatArray:
@@ -80,7 +149,15 @@ class Cutter(Shown):
     @property
     def equally_spaced(self) -> bool:
         """True where all teeth are alike, so that only multiples of the tooth-passing frequency are excited."""
-        return bool(np.ptp(self.pitch) < 1e-9 and np.ptp(self.runout) == 0.0)
+        waves = self.serration is not None and np.ptp(np.mod(self.serration.shifts(self.teeth), 1.0)) > 0.0
+        return bool(
+            np.ptp(self.pitch) < 1e-9
+            and np.ptp(self.runout) == 0.0
+            and np.ptp(self.axial_runout) == 0.0
+            and np.ndim(self.helix) == 0
+            and self.tilt == 0.0
+            and not waves
+        )
 
     def cylinder_remarks(self, depth: float | None = None, forces: bool = False) -> tuple[Remark, ...]:
         """Return what to make of an answer that took the cutter for a cylinder; nothing where it is one.
@@ -92,14 +169,20 @@ class Cutter(Shown):
         forces : bool
             Whether the answer was found from cutting forces.
         """
+        if self.profile is not None:
+            return ()
         sharp = depth is None or self.corner_radius <= IGNORED_CORNER * depth
         return () if self.shape is CutterShape.FLAT and sharp else (cylinder_remark(self.shape, forces),)
 
     def __str__(self) -> str:
         parts = [f"{self.teeth} {'tooth' if self.teeth == 1 else 'teeth'}", f"Ø{1e3 * self.diameter:.4g} mm"]
-        parts += [f"helix {np.degrees(self.helix):.3g}°"] if self.helix else []
+        parts += (
+            ["helix " + "/".join(f"{angle:.3g}" for angle in np.degrees(np.atleast_1d(self.helix))) + "°"] if np.any(self.helix) else []
+        )
         parts += [] if np.ptp(self.pitch) < 1e-9 else ["pitch " + "/".join(f"{angle:.4g}" for angle in np.degrees(self.pitch)) + "°"]
         parts += [f"run-out {1e6 * np.ptp(self.runout):.2g} µm"] if np.any(self.runout) else []
         parts += [] if self.shape is CutterShape.FLAT else [f"shape {self.shape}"]
         parts += [f"corner radius {1e3 * self.corner_radius:.4g} mm"] if self.corner_radius else []
+        parts += [] if self.serration is None else [str(self.serration)]
+        parts += [f"axial run-out {1e6 * np.ptp(self.axial_runout):.2g} µm"] if np.any(self.axial_runout) else []
         return ", ".join(parts)

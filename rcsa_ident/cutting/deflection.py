@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, non_negative, positive
 
@@ -111,7 +112,7 @@ def deflected_edge(process: MillingProcess, deflection: ToolDeflection, speed: f
         If the cut generates no wall, or is deeper than the tool is long.
     """
     radius = 0.5 * process.cutter.diameter
-    entry, leave = process.engagement.entry, process.engagement.exit
+    entry, leave = same_everywhere(process.engagement).angles
     down = bool(abs(leave - np.pi) < 1e-9)
     if down == (entry < 1e-9):
         raise InputError("engagement", np.degrees([entry, leave]).tolist(), "down-milling up to 180 degrees, or up-milling from 0")

@@ -10,7 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, same_everywhere
 from rcsa_ident.cutting.cutter import Cutter
 
 
@@ -103,7 +103,7 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
 
 def _per_depth(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, chip: ComplexArray, edge: ComplexArray) -> ComplexArray:
     """Lines of forces per depth whose forms are columns, shape (m, n)."""
-    entry, exit_ = conditions.engagement.entry, conditions.engagement.exit
+    entry, exit_ = same_everywhere(conditions.engagement).angles
     # teeth: sum_j e^{i m psi_j}, weighted by the feed that tooth j takes (its pitch)
     phases = np.exp(1j * np.outer(orders, cutter.tooth_angle))
     feed = conditions.feed_per_tooth * cutter.pitch * cutter.teeth / (2.0 * np.pi)
@@ -213,11 +213,12 @@ def force_history(
     height = (np.arange(slices) + 0.5) / slices * conditions.axial_depth
     lag = 2.0 * height * np.tan(cutter.helix) / cutter.diameter
     feed = conditions.feed_per_tooth * cutter.teeth * cutter.pitch / (2.0 * np.pi)
+    entry, exit_ = same_everywhere(conditions.engagement).angles
     for j in range(cutter.teeth):
         for each in lag:
             phi = np.mod(angle + cutter.tooth_angle[j] - each, 2.0 * np.pi)
             chip = _kinematic_chip(j, np.sin(phi), feed, cutter.runout)
-            cuts = (phi >= conditions.engagement.entry) & (phi < conditions.engagement.exit) & (chip > 0.0)
+            cuts = (phi >= entry) & (phi < exit_) & (chip > 0.0)
             force = tooth_force(phi, chip, coefficients)
             total += np.where(cuts[:, None], force, 0.0) * conditions.axial_depth / slices
     total[:, :2] = total[:, :2] @ conditions.machine_from_feed.T
@@ -295,7 +296,7 @@ def _runout_per_depth(
     for j in range(cutter.teeth):
         moved, offset = _chip_bounds(j, feed, cutter.runout)
         tooth = np.zeros_like(lines)
-        for start, end, k in _chip_pieces(moved, offset, conditions.engagement):
+        for start, end, k in _chip_pieces(moved, offset, same_everywhere(conditions.engagement)):
             a, b = moved[k], offset[k]
             window = _exponential_integral(q[None, :] - orders[:, None], start, end) / (2.0 * np.pi)
             tooth += window @ (a * per_feed + b * per_depth + edge)

@@ -8,7 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, same_everywhere
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Shown
@@ -49,7 +49,7 @@ def spindle_load(cutter: Cutter, conditions: CuttingConditions, coefficients: Cu
     conditions : CuttingConditions
     coefficients : CuttingCoefficients
     """
-    engagement, teeth = conditions.engagement, cutter.teeth
+    engagement, teeth = same_everywhere(conditions.engagement), cutter.teeth
     chips = coefficients.tangential * conditions.feed_per_tooth * (np.cos(engagement.entry) - np.cos(engagement.exit))
     edges = coefficients.tangential_edge * (engagement.exit - engagement.entry)
     torque = conditions.axial_depth * cutter.diameter * teeth / (4.0 * np.pi) * float(chips + edges)

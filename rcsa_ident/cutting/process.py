@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, EngagementProfile, feed_direction
+from rcsa_ident.cutting.conditions import AnyEngagement, CuttingConditions, Engagement, EngagementProfile, feed_direction, widest
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.plausibility import FEED_PER_TOOTH, IMMERSION, remarks_of
@@ -84,7 +84,7 @@ class MillingProcess(Shown):
     ----------
     cutter : Cutter
     coefficients : CuttingCoefficients
-    engagement : Engagement
+    engagement : Engagement, Block, Stepover or EngagementMap
     feed_angle : float [rad], default 0
         Direction of the feed in the machine's X-Y plane, from +X towards +Y.
     feed_per_tooth : float or None [m]
@@ -106,7 +106,7 @@ class MillingProcess(Shown):
 
     cutter: Cutter
     coefficients: CuttingCoefficients
-    engagement: Engagement
+    engagement: AnyEngagement
     feed_angle: float = 0.0
     feed_per_tooth: float | None = None
     damping: ProcessDamping | None = None
@@ -123,7 +123,17 @@ class MillingProcess(Shown):
     def remarks(self) -> tuple[Remark, ...]:
         """What is unusual about coefficients, feed and immersion, as a wrong unit would make it."""
         feed = () if self.feed_per_tooth is None else (("feed_per_tooth", FEED_PER_TOOTH, self.feed_per_tooth),)
-        return *self.coefficients.remarks, *remarks_of((*feed, ("radial immersion", IMMERSION, self.engagement.immersion)))
+        return *self.coefficients.remarks, *remarks_of((*feed, ("radial immersion", IMMERSION, self.widest.immersion)))
+
+    @property
+    def is_plain(self) -> bool:
+        """True where every point of the edge cuts alike but for its lag: a cylinder that is engaged at all heights as at the tip."""
+        return self.cutter.is_cylinder and isinstance(self.engagement, Engagement)
+
+    @property
+    def widest(self) -> Engagement:
+        """The smallest engagement that holds those of all points of the edge."""
+        return widest(self.engagement, self.cutter.outline, self.cutter.outline.height)
 
     @property
     def machine_from_feed(self) -> np.ndarray:

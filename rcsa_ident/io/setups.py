@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, same_everywhere
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
@@ -420,6 +420,7 @@ def cut_keys(name: str, tooling: str, conditions: CuttingConditions, last_speed:
     last_speed : float or None [rad/s]
         Of a pass whose speed changes.
     """
+    entry, leave = same_everywhere(conditions.engagement).angles
     return {
         "id": name,
         "tooling": tooling,
@@ -427,8 +428,8 @@ def cut_keys(name: str, tooling: str, conditions: CuttingConditions, last_speed:
         **({} if last_speed is None else {"spindle_speed_to_rpm": to_rpm(last_speed)}),
         "axial_depth_mm": conditions.axial_depth * 1e3,
         "feed_per_tooth_mm": conditions.feed_per_tooth * 1e3,
-        "entry_angle_deg": float(np.degrees(conditions.engagement.entry)),
-        "exit_angle_deg": float(np.degrees(conditions.engagement.exit)),
+        "entry_angle_deg": float(np.degrees(entry)),
+        "exit_angle_deg": float(np.degrees(leave)),
         "feed_direction": feed_direction_of(conditions.feed_angle),
         "cut": f"recordings/{name}_cut.h5",
         "air": f"recordings/{name}_air.h5",

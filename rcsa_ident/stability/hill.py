@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -83,13 +84,13 @@ class PeriodicTeeth:
     def _lines(self, count: int, depth: float, tangential: float, radial: float) -> ComplexArray:
         r = np.arange(-count, count + 1)
         kept = np.abs(r) <= (count if self.harmonics is None else self.harmonics)
-        cutter, engagement = self.process.cutter, self.process.engagement
+        cutter, engagement = self.process.cutter, same_everywhere(self.process.engagement)
         order = cutter.teeth * r
         q = np.array([-2, 0, 2])
         sc, ss, cc = np.array([0.25j, 0, -0.25j]), np.array([-0.25, 0.5, -0.25]), np.array([0.25, 0.5, 0.25])
         form = tangential * np.array([[-sc, -cc], [ss, sc]]) - radial * np.array([[ss, sc], [sc, cc]])
         # the integral of e^{i (q - m) phi} over the immersion
-        start, end = engagement.entry, engagement.exit
+        start, end = engagement.angles
         n, half = q - order[:, None], 0.5 * (end - start)
         window = 2.0 * half * np.exp(0.5j * n * (start + end)) * np.sinc(n * half / np.pi)
         lines = cutter.teeth / (2.0 * np.pi) * np.einsum("rq,ijq->rij", window, form)

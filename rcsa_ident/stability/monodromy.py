@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.force import regenerations
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
@@ -78,13 +79,14 @@ class MonodromyOperator:
         if uneven and process.engagement_profile is not None:
             raise InputError("runout", cutter.runout.tolist(), "equal teeth beside an engagement that changes along the edge")
         # (offset, start, end, delay) of the teeth that differ
-        entry, leave = process.engagement.entry, process.engagement.exit
+        engagement = same_everywhere(process.engagement)
+        entry, leave = engagement.angles
         if equal and not uneven:
             windows = [(0.0, entry, leave, float(cutter.pitch[0]))]
             self.spacing = float(cutter.pitch[0])
         else:
             pieces = (
-                regenerations(cutter, process.feed_per_tooth, process.engagement)
+                regenerations(cutter, process.feed_per_tooth, engagement)
                 if uneven and process.feed_per_tooth is not None
                 else [(j, entry, leave, 1) for j in range(cutter.teeth)]
             )
@@ -246,7 +248,7 @@ class MonodromyOperator:
 def stable_depth_bound(modes: TipModes, process: MillingProcess) -> float:
     """A depth at which nothing can grow: the gain round the loop is below one at every frequency [m]."""
     c = process.coefficients
-    teeth = max(1.0, np.ceil((process.engagement.exit - process.engagement.entry) / float(np.min(process.cutter.pitch))))
+    teeth = max(1.0, np.ceil((process.widest.exit - process.widest.entry) / float(np.min(process.cutter.pitch))))
     return float(0.9 / (2.0 * teeth * c.tangential * np.hypot(1.0, c.radial_ratio) * modes.largest))
 
 

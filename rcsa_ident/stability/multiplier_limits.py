@@ -73,7 +73,7 @@ def visits(process: MillingProcess, speeds: FloatArray, top: float, max_depth: f
     degree, frozen
         As of `MonodromyOperator`.
     """
-    cutter, engagement = process.cutter, process.engagement
+    cutter, engagement = process.cutter, process.widest
     uneven = bool(np.ptp(cutter.pitch) > 1e-9 or np.ptp(cutter.runout) > 0.0)
     period = common_period(process, 2.0 * np.pi if uneven else float(cutter.pitch[0]))
     # every tooth that differs enters and leaves at points of its own
@@ -93,10 +93,10 @@ def islands_from(process: MillingProcess) -> float:
     Where a helix spreads an interrupted cut over the angle, period doubling ends above as well as below, at depths that are shares
     of the axial pitch.
     """
-    in_cut = process.cutter.teeth * (process.engagement.exit - process.engagement.entry) / (2.0 * np.pi)
-    if process.cutter.helix < 1e-6 or in_cut >= 1.0:
+    in_cut = process.cutter.teeth * (process.widest.exit - process.widest.entry) / (2.0 * np.pi)
+    if process.cutter.largest_lag < 2e-6 / process.cutter.diameter or in_cut >= 1.0:
         return np.inf
-    return float(ISLANDS * np.pi * process.cutter.diameter / (process.cutter.teeth * np.tan(process.cutter.helix)))
+    return float(ISLANDS * 2.0 * np.pi / (process.cutter.teeth * process.cutter.largest_lag))
 
 
 def marched_lobes(

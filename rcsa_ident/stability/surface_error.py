@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.conditions import Engagement, same_everywhere
 from rcsa_ident.cutting.force import force_lines, runout_force_lines
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
@@ -105,7 +105,7 @@ def surface_location_error(
     depth = positive("depth", depth, "m")
     if heights < 1:
         raise InputError("heights", heights, "1 or more")
-    side = _wall(process.engagement, wall)
+    side = _wall(same_everywhere(process.engagement), wall)
     cutter = process.cutter
     speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
     height = np.linspace(0.0, depth, heights)

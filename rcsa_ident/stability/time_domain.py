@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
@@ -318,7 +319,7 @@ class _Cut:
         whole = 2.0 * depth * np.tan(process.cutter.helix) / process.cutter.diameter
         count = max(1, int(np.ceil(_SLICES * whole)))
         if process.engagement_profile is None:
-            rows = np.array([[0.0, 1.0, process.engagement.entry, process.engagement.exit]])
+            rows = np.array([[0.0, 1.0, *same_everywhere(process.engagement).angles]])
         else:
             rows = process.engagement_profile(self.speed, depth)
         each = int(np.ceil(count / len(rows)))

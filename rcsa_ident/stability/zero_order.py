@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.directional import mean_directional_matrix
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
@@ -143,7 +144,7 @@ def _directions(process: MillingProcess) -> FloatArray:
     if process.engagement_profile is not None:
         allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
         raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
-    return mean_directional_matrix(process.cutter.teeth, process.engagement, process.coefficients, process.feed_angle)
+    return mean_directional_matrix(process.cutter.teeth, same_everywhere(process.engagement), process.coefficients, process.feed_angle)
 
 
 def _of_ratio(process: MillingProcess) -> FloatArray:
@@ -198,7 +199,7 @@ def _unlike_teeth(process: MillingProcess) -> str:
 
 
 def _doubts(process: MillingProcess, receptance: Receptance, critical: float | None) -> list[str]:
-    cutter, engagement = process.cutter, process.engagement
+    cutter, engagement = process.cutter, process.widest
     doubts = []
     in_cut = cutter.teeth * (engagement.exit - engagement.entry) / (2.0 * np.pi)
     if in_cut < FEWEST_TEETH_IN_CUT - 1e-9:

@@ -73,7 +73,7 @@ def cutter_values(cutter: Cutter) -> Iterator[tuple[str, Range, float]]:
     """Yield what is asked of a cutter by itself: its key, the range, the value."""
     yield "cutter.teeth", TEETH, cutter.teeth
     yield "cutter.diameter_mm", DIAMETER, cutter.diameter
-    yield "cutter.helix_deg", HELIX, cutter.helix
+    yield "cutter.helix_deg", HELIX, float(cutter.helices.max())
 
 
 def _values(assembly: ToolAssembly, cutter: Cutter) -> Iterator[tuple[str, Range, float]]:

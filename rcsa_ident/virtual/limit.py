@@ -10,7 +10,7 @@ import scipy.optimize
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.conditions import CuttingConditions, same_everywhere
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.virtual.reduction import Poles
@@ -261,7 +261,7 @@ def directional_matrices(cutter: Cutter, conditions: CuttingConditions, coeffici
         Instants in a tooth period.
     """
     pitch = 2.0 * np.pi / cutter.teeth
-    entry, leave = conditions.engagement.entry, conditions.engagement.exit
+    entry, leave = same_everywhere(conditions.engagement).angles
     kr = coefficients.radial_ratio
     lag = 2.0 * conditions.axial_depth * np.tan(cutter.helix) / cutter.diameter
     step = pitch / count

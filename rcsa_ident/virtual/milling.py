@@ -10,7 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.conditions import CuttingConditions, same_everywhere
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual._kernels import mill
@@ -207,8 +207,7 @@ def _cut_arrays(
     cut = np.array(
         [
             0.0,
-            conditions.engagement.entry,
-            conditions.engagement.exit,
+            *same_everywhere(conditions.engagement).angles,
             max(speed * step, lag),
             lag,
             c.tangential * width,

@@ -198,3 +198,9 @@ def clipped_samples(x: np.ndarray) -> int:
         return 0
     piled = count[0] > 5.0 * count[1], count[-1] > 5.0 * count[-2]
     return sum(int(run.sum()) for run, full in zip(runs, piled, strict=True) if full and run.size >= 2)
+
+
+def smallest_chip(moved, step, phi):
+    """Return the smallest of moved sin(phi) + step, and whose it is, at each angle: chip and surface of one tooth at one height."""
+    distances = np.asarray(moved)[:, None] * np.sin(phi) + np.asarray(step)[:, None]
+    return distances.min(axis=0), distances.argmin(axis=0)

@@ -1,0 +1,204 @@
+"""Rows: what of which tooth cuts between which angles, the one noun from which forces and all stability methods are summed.
+
+A row is a piece of one tooth's edge that cuts along one arc and follows one surface. At a point of a curved edge it is a node of a
+quadrature; along a wall, where all but the lag is constant, it is the whole edge, and what it does is integrated in closed form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import lru_cache
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting._chip_kernels import chip_pieces
+from rcsa_ident.cutting.conditions import AnyEngagement, EngagementMap
+from rcsa_ident.cutting.cutter import Cutter, HelixKind
+from rcsa_ident.cutting.segments import Line, Segment
+from rcsa_ident.cutting.teeth import Edges, edges_at
+from rcsa_ident.errors import InputError
+
+#: Nodes of a piece of the outline, and one more for each of these angles that its edge lags [rad]; nodes of a wave of a serrated edge.
+NODES, _LAG, _WAVE = 8, 0.08, 24
+#: What of a wall is a wall [rad].
+_UPRIGHT = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Pieces of edge in the cut, arrays of shape (n,).
+
+    Parameters
+    ----------
+    angle : [rad]
+        Of the tooth ahead of tooth 1, at its tip.
+    near, far : [rad]
+        Between which lags behind its tip the piece stands; the same where it is a point.
+    start, end : [rad]
+        Immersion angles between which it cuts.
+    delay : [rad]
+        Rotation since the surface that it cuts was made.
+    feed, step : [m]
+        The chip, measured radially, is feed sin(phi) + step.
+    z, r : [m]
+        Height above the tip, and radius.
+    kappa : [rad]
+        Angle of the edge's outward normal, from the axis pointing down.
+    width : [m]
+        Along the edge, in the plane of axis and radius.
+    spacing : float [rad]
+        Rotation after which the next tooth stands as these do: a pitch where all teeth are alike and only one has rows, else a turn.
+    """
+
+    angle: FloatArray
+    near: FloatArray
+    far: FloatArray
+    start: FloatArray
+    end: FloatArray
+    delay: FloatArray
+    feed: FloatArray
+    step: FloatArray
+    z: FloatArray
+    r: FloatArray
+    kappa: FloatArray
+    width: FloatArray
+    spacing: float
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return int(self.angle.size)
+
+    @property
+    def points(self) -> bool:
+        """Whether any of them is a node of a curved edge."""
+        return bool(np.any(self.far <= self.near)) and self.count > 1
+
+
+#: Names of the arrays of rows, in their order.
+COLUMNS = tuple(each.name for each in fields(Rows))[:-1]
+
+
+def rows_of(
+    cutter: Cutter,
+    engagement: AnyEngagement,
+    depth: float,
+    feed_per_tooth: float | None = None,
+    along: bool = False,
+    nodes: int = NODES,
+) -> Rows:
+    """Return what of which tooth cuts, down to a depth.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    engagement : Engagement, Block, Stepover or EngagementMap
+    depth : float [m]
+    feed_per_tooth : float or None [m]
+        Decides where teeth are offset from each other; else it scales the chip only, and None counts as 1.
+    along : bool
+        Whether where a piece stands along the edge matters, as it does to the tip's slopes: walls are nodes then, too.
+    nodes : int
+        Of a curved piece of the outline, at least.
+
+    Raises
+    ------
+    InputError
+        If the depth is beyond the edge, teeth meet, nothing cuts, or teeth are offset and no feed is told.
+    """
+    outline = cutter.outline
+    if depth > outline.height * (1.0 + 1e-9):
+        raise InputError("depth", f"{1e3 * depth:g} mm", f"at most {1e3 * outline.height:g} mm, where the cutter's edge ends")
+    rise = engagement.feed_rise if isinstance(engagement, EngagementMap) else 0.0
+    offset = not cutter.equally_spaced and _offset(cutter)
+    if offset and feed_per_tooth is None:
+        raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
+    feed_per_tooth = 1.0 if feed_per_tooth is None else feed_per_tooth
+    found: list[FloatArray] = []
+    for segment, low, high in outline.pieces(depth, engagement.radii, engagement.heights):
+        if not along and _is_wall(cutter, segment):
+            share, width = np.array([0.5 * (low + high)]), np.array([(high - low) * segment.length])
+        else:
+            share, width = _nodes(cutter, segment, low, high, nodes, bool(engagement.radii))
+        r, z, kappa = segment.at(share)
+        edges = edges_at(cutter, z, kappa)
+        span = 0.5 * width * np.tan(cutter.helices)[:, None] * 2.0 / cutter.diameter if share.size == 1 else np.zeros_like(edges.lag)
+        arcs = engagement.arcs(r, z)
+        found += _of_piece(cutter, edges, span, arcs, np.stack([z, r, kappa, width]), feed_per_tooth, rise, offset)
+    if not found:
+        raise InputError("engagement", f"{engagement}, depth {1e3 * depth:g} mm", "a cut in which some tooth cuts")
+    values = np.concatenate(found, axis=1)
+    spacing = float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi
+    return Rows(**dict(zip(COLUMNS, values, strict=True)), spacing=spacing)
+
+
+def _offset(cutter: Cutter) -> bool:
+    """Whether teeth are offset from each other, so that one may cut what the one ahead of it left standing."""
+    plain = np.ptp(cutter.runout) == 0.0 and np.ptp(cutter.axial_runout) == 0.0 and cutter.tilt == 0.0
+    return cutter.serration is not None or not plain
+
+
+def _is_wall(cutter: Cutter, segment: Segment) -> bool:
+    """Whether all but the lag is constant along it."""
+    upright = isinstance(segment, Line) and abs(segment.kappa - 0.5 * np.pi) < _UPRIGHT
+    return (
+        upright and cutter.serration is None and cutter.tilt == 0.0 and np.ndim(cutter.helix) == 0 and cutter.helix_kind is HelixKind.LEAD
+    )
+
+
+@lru_cache(maxsize=64)
+def _gauss(count: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre nodes and weights on 0 to 1."""
+    node, weight = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (node + 1.0), 0.5 * weight
+
+
+def _nodes(cutter: Cutter, segment: Segment, low: float, high: float, least: int, corners: bool) -> tuple[FloatArray, FloatArray]:
+    """Shares of the way along a segment, and the widths for which they stand."""
+    _, z, _ = segment.at(np.array([low, high]))
+    rise = float(z[1] - z[0])
+    if cutter.serration is not None:
+        # waves repeat themselves: equal steps
+        count = max(4, int(np.ceil(_WAVE * rise / cutter.serration.wavelength)))
+        share, weight = (np.arange(count) + 0.5) / count, np.full(count, 1.0 / count)
+    else:
+        lag = float(np.max(np.tan(cutter.helices))) * 2.0 * rise / cutter.diameter
+        share, weight = _gauss(least + int(np.ceil(lag / _LAG)))
+        if corners:
+            # arcs begin and end like square roots where the stock's corner meets the outline
+            share, weight = share**2 * (3.0 - 2.0 * share), weight * 6.0 * share * (1.0 - share)
+    return low + (high - low) * share, weight * (high - low) * segment.length
+
+
+def _of_piece(
+    cutter: Cutter, edges: Edges, span: FloatArray, arcs: FloatArray, places: FloatArray, feed: float, rise: float, offset: bool
+) -> list[FloatArray]:
+    """Rows of the nodes of one piece, tables whose rows are the fields of `Rows`; places are z, r, kappa and width of the nodes."""
+    found = []
+    z, r, kappa, width = places
+    per_turn = feed * cutter.teeth / (2.0 * np.pi)
+    # a feed towards the spindle takes the edge out of the material, the more the flatter it lies
+    climb = np.sin(rise) / np.tan(kappa) if rise else np.zeros_like(z)
+    for j in range(1 if cutter.equally_spaced else cutter.teeth):
+        lag, half = edges.lag[j], span[j]
+        # a wave leans the edge and lengthens it; its height stays
+        own = np.arctan2(np.sin(kappa), np.cos(kappa) + edges.slope[j] * np.sin(kappa))
+        wide = width * np.sin(kappa) / np.sin(own)
+        tooth = np.full_like(z, cutter.tooth_angle[j])
+        order = (j + np.arange(cutter.teeth if offset else 1)) % cutter.teeth
+        delay = np.cumsum(edges.pitch[order], axis=0)
+        moved = np.cos(rise) * per_turn * delay
+        step = edges.offset[j] - edges.offset[(order + 1) % cutter.teeth] - climb * per_turn * delay
+        for start, end in np.moveaxis(arcs, 2, 1):
+            keep = end > start + 1e-12
+            if offset:
+                node, which, start, end = chip_pieces(moved, step, start.copy(), end.copy(), keep)
+            else:
+                node, which = np.flatnonzero(keep), 0
+                start, end = start[keep], end[keep]
+            if node.size:
+                chip = delay[which, node], moved[which, node], step[which, node]
+                own_place = z[node], r[node], own[node], wide[node]
+                found.append(np.stack([tooth[node], (lag - half)[node], (lag + half)[node], start, end, *chip, *own_place]))
+    return found

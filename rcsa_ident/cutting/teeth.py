@@ -1,0 +1,96 @@
+"""Where each tooth's edge stands along a cutter: lag behind the tip, pitch to the tooth ahead, radial offset."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.cutter import Cutter, HelixKind
+from rcsa_ident.cutting.segments import Line
+from rcsa_ident.errors import InputError
+
+#: Below this share of the largest radius an edge of constant angle does not wind on: it would without end at the axis.
+_POLE = 0.02
+#: Points of the table by which a lag of constant angle is told, a segment.
+_POINTS = 257
+
+
+class Edges(NamedTuple):
+    """The teeth's edges at n places along the outline.
+
+    Parameters
+    ----------
+    lag : array, shape (teeth, n) [rad]
+        By which each edge lags its own tip.
+    pitch : array, shape (teeth, n) [rad]
+        From each tooth to the one ahead of it.
+    offset : array, shape (teeth, n) [m]
+        Radial, of each edge from the outline.
+    slope : array, shape (teeth, n) [-]
+        Of the serration, over the height.
+    """
+
+    lag: FloatArray
+    pitch: FloatArray
+    offset: FloatArray
+    slope: FloatArray
+
+
+def edges_at(cutter: Cutter, z: FloatArray, kappa: FloatArray) -> Edges:
+    """Return where the teeth's edges stand at heights z [m] of the outline, whose normals have the angles kappa [rad].
+
+    Raises
+    ------
+    InputError
+        If the teeth meet below the highest place.
+    """
+    lag = lags(cutter, z)
+    pitch = cutter.pitch[:, None] + lag - np.roll(lag, -1, axis=0)
+    if np.any(pitch <= 0.0):
+        tooth, place = np.argwhere(pitch <= 0.0)[0]
+        found = f"teeth {tooth + 1} and {(tooth + 1) % cutter.teeth + 1} that meet {1e3 * z[place]:.4g} mm above the tip"
+        raise InputError("helix", found, "angles at which teeth meet nowhere in the cut, or a smaller depth")
+    turned = cutter.tooth_angle[:, None] - lag
+    # a tooth that stands higher is narrower where the outline widens upwards
+    with np.errstate(divide="ignore"):
+        widening = np.where(np.abs(kappa - 0.5 * np.pi) < 1e-12, 0.0, 1.0 / np.tan(np.maximum(kappa, 1e-12)))
+    axial = np.where(cutter.axial_runout[:, None] == 0.0, 0.0, cutter.axial_runout[:, None] * widening)
+    offset = cutter.runout[:, None] + np.tan(cutter.tilt) * z * np.cos(turned) - axial
+    slope = np.zeros_like(offset)
+    if cutter.serration is not None:
+        waves = [cutter.serration.at(z, shift) for shift in cutter.serration.shifts(cutter.teeth)]
+        offset = offset + np.array([wave for wave, _ in waves])
+        slope = np.array([along for _, along in waves])
+    return Edges(lag, pitch, offset, slope)
+
+
+def lags(cutter: Cutter, z: FloatArray) -> FloatArray:
+    """Return by which angle each edge lags its tip at heights above it [m], shape (teeth, n) [rad].
+
+    Notes
+    -----
+    Of constant lead 2 z tan(helix) / diameter; of constant angle the integral of tan(helix) / r along the outline.
+    """
+    wound = 2.0 * z / cutter.diameter if cutter.helix_kind is HelixKind.LEAD else _wound(cutter, z)
+    return np.tan(cutter.helices)[:, None] * wound
+
+
+def _wound(cutter: Cutter, z: FloatArray) -> FloatArray:
+    """Integral of db / r from the tip to heights [-]."""
+    least = _POLE * cutter.outline.largest_radius
+    heights, angles = [0.0], [0.0]
+    for segment in cutter.outline.segments:
+        _, low, _, high = segment.ends
+        if high <= low or low >= np.max(z):
+            continue
+        shares = np.linspace(0.0, 1.0, _POINTS)
+        r, there, _ = segment.at(shares)
+        rate = segment.length / np.maximum(r, least)
+        if isinstance(segment, Line) and np.ptp(r) == 0.0:
+            shares, there, rate = shares[[0, -1]], there[[0, -1]], rate[[0, -1]]
+        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(shares)
+        angles += (angles[-1] + np.cumsum(steps)).tolist()
+        heights += there[1:].tolist()
+    return np.interp(z, heights, angles)
