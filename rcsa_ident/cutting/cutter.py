@@ -132,6 +132,12 @@ class Cutter(Shown):
         return self.profile is None and self.serration is None and self.tilt == 0.0 and np.ndim(self.helix) == 0
 
     @property
+    def offset(self) -> bool:
+        """Whether teeth are offset from each other, so that one may cut what the one ahead of it left standing."""
+        plain = np.ptp(self.runout) == 0.0 and np.ptp(self.axial_runout) == 0.0 and self.tilt == 0.0
+        return not self.equally_spaced and (self.serration is not None or not plain)
+
+    @property
     def outline(self) -> Profile:
         """What the edges sweep over."""
         return Profile.flat(self.diameter) if self.profile is None else self.profile

@@ -20,7 +20,7 @@ from rcsa_ident.cutting.teeth import Edges, edges_at
 from rcsa_ident.errors import InputError
 
 #: Nodes of a piece of the outline, and one more for each of these angles that its edge lags [rad]; nodes of a wave of a serrated edge.
-NODES, _LAG, _WAVE = 8, 0.08, 24
+NODES, _LAG, _WAVE = 8, 0.08, 256
 #: What of a wall is a wall [rad].
 _UPRIGHT = 1e-12
 
@@ -88,7 +88,7 @@ def rows_of(
     along: bool = False,
     nodes: int = NODES,
 ) -> Rows:
-    """Return what of which tooth cuts, down to a depth.
+    """Return what of which tooth cuts, down to a depth; no rows where none of them reaches the material.
 
     Parameters
     ----------
@@ -105,14 +105,13 @@ def rows_of(
     Raises
     ------
     InputError
-        If the depth is beyond the edge, teeth meet, nothing cuts, or teeth are offset and no feed is told.
+        If the depth is beyond the edge, teeth meet, or teeth are offset and no feed is told.
     """
     outline = cutter.outline
     if depth > outline.height * (1.0 + 1e-9):
         raise InputError("depth", f"{1e3 * depth:g} mm", f"at most {1e3 * outline.height:g} mm, where the cutter's edge ends")
     rise = engagement.feed_rise if isinstance(engagement, EngagementMap) else 0.0
-    offset = not cutter.equally_spaced and _offset(cutter)
-    if offset and feed_per_tooth is None:
+    if cutter.offset and feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
     feed_per_tooth = 1.0 if feed_per_tooth is None else feed_per_tooth
     found: list[FloatArray] = []
@@ -123,20 +122,14 @@ def rows_of(
             share, width = _nodes(cutter, segment, low, high, nodes, bool(engagement.radii))
         r, z, kappa = segment.at(share)
         edges = edges_at(cutter, z, kappa)
-        span = 0.5 * width * np.tan(cutter.helices)[:, None] * 2.0 / cutter.diameter if share.size == 1 else np.zeros_like(edges.lag)
+        # a wall as a whole, and cells of a wave, lag between their ends
+        spans = share.size == 1 or cutter.serration is not None
+        span = float(spans) * width * np.sin(kappa) * np.tan(cutter.helices)[:, None] / cutter.diameter
         arcs = engagement.arcs(r, z)
-        found += _of_piece(cutter, edges, span, arcs, np.stack([z, r, kappa, width]), feed_per_tooth, rise, offset)
-    if not found:
-        raise InputError("engagement", f"{engagement}, depth {1e3 * depth:g} mm", "a cut in which some tooth cuts")
-    values = np.concatenate(found, axis=1)
+        found += _of_piece(cutter, edges, span, arcs, np.stack([z, r, kappa, width]), feed_per_tooth, rise)
+    values = np.concatenate(found, axis=1) if found else np.zeros((len(COLUMNS), 0))
     spacing = float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi
     return Rows(**dict(zip(COLUMNS, values, strict=True)), spacing=spacing)
-
-
-def _offset(cutter: Cutter) -> bool:
-    """Whether teeth are offset from each other, so that one may cut what the one ahead of it left standing."""
-    plain = np.ptp(cutter.runout) == 0.0 and np.ptp(cutter.axial_runout) == 0.0 and cutter.tilt == 0.0
-    return cutter.serration is not None or not plain
 
 
 def _is_wall(cutter: Cutter, segment: Segment) -> bool:
@@ -159,9 +152,10 @@ def _nodes(cutter: Cutter, segment: Segment, low: float, high: float, least: int
     _, z, _ = segment.at(np.array([low, high]))
     rise = float(z[1] - z[0])
     if cutter.serration is not None:
-        # waves repeat themselves: equal steps
-        count = max(4, int(np.ceil(_WAVE * rise / cutter.serration.wavelength)))
-        share, weight = (np.arange(count) + 0.5) / count, np.full(count, 1.0 / count)
+        # waves repeat themselves: equal steps, which stay where they are when the depth grows
+        step = cutter.serration.wavelength / (_WAVE * rise)
+        ends = np.append(np.arange(0.0, 1.0 - 1e-9, step), 1.0)
+        share, weight = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
     else:
         lag = float(np.max(np.tan(cutter.helices))) * 2.0 * rise / cutter.diameter
         share, weight = _gauss(least + int(np.ceil(lag / _LAG)))
@@ -172,7 +166,7 @@ def _nodes(cutter: Cutter, segment: Segment, low: float, high: float, least: int
 
 
 def _of_piece(
-    cutter: Cutter, edges: Edges, span: FloatArray, arcs: FloatArray, places: FloatArray, feed: float, rise: float, offset: bool
+    cutter: Cutter, edges: Edges, span: FloatArray, arcs: FloatArray, places: FloatArray, feed: float, rise: float
 ) -> list[FloatArray]:
     """Rows of the nodes of one piece, tables whose rows are the fields of `Rows`; places are z, r, kappa and width of the nodes."""
     found = []
@@ -186,13 +180,13 @@ def _of_piece(
         own = np.arctan2(np.sin(kappa), np.cos(kappa) + edges.slope[j] * np.sin(kappa))
         wide = width * np.sin(kappa) / np.sin(own)
         tooth = np.full_like(z, cutter.tooth_angle[j])
-        order = (j + np.arange(cutter.teeth if offset else 1)) % cutter.teeth
+        order = (j + np.arange(cutter.teeth if cutter.offset else 1)) % cutter.teeth
         delay = np.cumsum(edges.pitch[order], axis=0)
         moved = np.cos(rise) * per_turn * delay
         step = edges.offset[j] - edges.offset[(order + 1) % cutter.teeth] - climb * per_turn * delay
         for start, end in np.moveaxis(arcs, 2, 1):
             keep = end > start + 1e-12
-            if offset:
+            if cutter.offset:
                 node, which, start, end = chip_pieces(moved, step, start.copy(), end.copy(), keep)
             else:
                 node, which = np.flatnonzero(keep), 0

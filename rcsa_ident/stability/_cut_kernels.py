@@ -1,12 +1,14 @@
 """Which teeth stand where in a period of a milling cut, and what they push with; arrays and scalars only.
 
-Teeth stand in *windows*: rows of
+Pieces of edge stand in *windows*: rows of
 
-    offset, start, end, upper share, lower share, delay     (angles [rad], shares of the depth, place in the list of delays)
+    offset, start, end, near, far, delay, splits     (angles [rad], the delay's place in the list of delays, 1 or 0)
 
-so that at the rotation theta a point at the height z of the edge is at phi = theta + offset - lag z and cuts for start <= phi < end;
-copies of a window follow each other by `spacing`. F = sum K_d(theta) (y(theta) - y(theta - delay_d)) + C(theta) y'. The angles at which
-a window opens or closes split the period into elements, elements into steps of at most a given length, steps into Gauss-Lobatto nodes.
+so that at the rotation theta a point of the edge that lags its tip by an angle between near and far is at phi = theta + offset - lag and
+cuts for start <= phi < end; copies of a window follow each other by `spacing`. Of each stands a *form* beside it: what it pushes with, as
+a sum of 1, cos, sin, cos 2 and sin 2 of phi. F = sum K_d(theta) (y(theta) - y(theta - delay_d)) + C(theta) y'. The angles at which a
+window opens or closes split the period into elements, elements into steps of at most a given length, steps into Gauss-Lobatto nodes; of
+a serrated edge's many narrow windows, which open and close gradually, they do not.
 
 `table` holds the nodes, their weights, and row by row the Lagrange polynomials' coefficients of s^k.
 """
@@ -23,21 +25,12 @@ _NARROW = 1e-7
 
 
 class CutPlan(NamedTuple):
-    """A cut at a speed and a depth: what all its teeth share."""
+    """A cut at a speed: what all its teeth share."""
 
     #: Angles [rad].
     period: float
     spacing: float
     speed: float
-    depth: float
-    #: Angle by which the edge lags, per height.
-    lag: float
-    #: Stiffness per depth; damping per depth, times the cutting speed.
-    k_tangential: float
-    k_radial: float
-    c_tangential: float
-    c_radial: float
-    radius: float
     #: Amplitude and ratio of a varying speed.
     swing: float
     swings: float
@@ -58,7 +51,7 @@ class CutLayout(NamedTuple):
     #: At the points, by delay, shapes (n, d, r, r), (n, r, r).
     stiffness: np.ndarray
     damping: np.ndarray
-    #: As `lookups`, shapes (n, d), (n, d, q + 1).
+    #: As `lookups`, shapes (n, d), below zero where nothing is pushed with that delay, and (n, d, q + 1).
     where: np.ndarray
     weight: np.ndarray
     #: Shape (n,).
@@ -93,47 +86,50 @@ def time_at(angle, plan):
 
 
 @numba.njit(cache=True)
-def add_window(theta, middle, row, plan, weights, out):
-    """Add a window's matrices (feed axes, per unit displacement and velocity) at theta, inside the element around `middle`.
+def add_window(theta, middle, row, spacing, basis):
+    """Add to `basis`, shape (5,), the sums over a window's copies of 1, cos, sin, cos 2, sin 2 at theta, means over its lags.
 
-    weights : (stiffness tangential, radial, damping tangential, radial); out : shape (2, 2, 2).
+    They are those inside the element around `middle`; returns whether any copy cuts there.
     """
-    offset, start, end, upper, lower = row[0], row[1], row[2], row[3], row[4]
-    near, far = plan.lag * plan.depth * upper, plan.lag * plan.depth * lower
-    share, spacing = lower - upper, plan.spacing
-    # copies whose edge stands between start and end somewhere along its height
+    offset, start, end, near, far = row[0], row[1], row[2], row[3], row[4]
+    # copies whose edge stands between start and end somewhere
     first = math.ceil((middle + offset - far - end) / spacing - 1e-12)
     last = math.floor((middle + offset - near - start) / spacing + 1e-12)
+    cuts = False
     for k in range(first, last + 1):
         turn = offset - k * spacing
-        sc, ss, cc = 0.0, 0.0, 0.0
         if far - near < _NARROW:
-            phi = theta + turn - 0.5 * (near + far)
-            if start <= middle + turn - 0.5 * (near + far) < end:
-                s, c = math.sin(phi), math.cos(phi)
-                sc, ss, cc = s * c, s * s, c * c
+            lag = 0.5 * (near + far)
+            if start <= middle + turn - lag < end:
+                s, c = math.sin(theta + turn - lag), math.cos(theta + turn - lag)
+                basis[0] += 1.0
+                basis[1] += c
+                basis[2] += s
+                basis[3] += c * c - s * s
+                basis[4] += 2.0 * s * c
+                cuts = True
         else:
             high = min(max(theta + turn - near, start), end)
             low = min(max(theta + turn - far, start), end)
-            sines = math.sin(2.0 * high) - math.sin(2.0 * low)
-            sc = -0.25 * (math.cos(2.0 * high) - math.cos(2.0 * low)) / (far - near)
-            ss = (0.5 * (high - low) - 0.25 * sines) / (far - near)
-            cc = (0.5 * (high - low) + 0.25 * sines) / (far - near)
-        for i in range(2):
-            t, r = share * weights[2 * i], share * weights[2 * i + 1]
-            out[i, 0, 0] -= t * sc + r * ss
-            out[i, 0, 1] -= t * cc + r * sc
-            out[i, 1, 0] += t * ss - r * sc
-            out[i, 1, 1] += t * sc - r * cc
+            over = 1.0 / (far - near)
+            s, c, s_low, c_low = math.sin(high), math.cos(high), math.sin(low), math.cos(low)
+            basis[0] += over * (high - low)
+            basis[1] += over * (s - s_low)
+            basis[2] += over * (c_low - c)
+            basis[3] += over * (s * c - s_low * c_low)
+            basis[4] += over * (s * s - s_low * s_low)
+            cuts = True
+    return cuts
 
 
 @numba.njit(cache=True)
 def _cuts(middle, rows, plan):
     """Whether any tooth is in the cut at this rotation."""
     for row in rows:
-        near, far = plan.lag * plan.depth * row[3], plan.lag * plan.depth * row[4]
-        first = math.ceil((middle + row[0] - far - row[2]) / plan.spacing - 1e-12)
-        if first * plan.spacing <= middle + row[0] - near - row[1]:
+        if row[6] == 0.0:
+            return True
+        first = math.ceil((middle + row[0] - row[4] - row[2]) / plan.spacing - 1e-12)
+        if first * plan.spacing <= middle + row[0] - row[3] - row[1]:
             return True
     return False
 
@@ -145,7 +141,9 @@ def elements(rows, plan, degree):
     edges = np.empty(4 * rows.shape[0] * (int(period / plan.spacing) + 3) + 2)
     edges[0], edges[1], count = 0.0, period, 2
     for row in rows:
-        near, far = plan.lag * plan.depth * row[3], plan.lag * plan.depth * row[4]
+        if row[6] == 0.0:
+            continue
+        near, far = row[3], row[4]
         for phi in (row[1], row[2]):
             for lag in (near, far):
                 place = (phi + lag - row[0]) % plan.spacing
@@ -184,12 +182,16 @@ def elements(rows, plan, degree):
 
 
 @numba.njit(cache=True)
-def coefficients(rows, shapes, plan, places, points, table):
-    """Stiffness by delay (n, d, r, r), its sum's damping (n, r, r), and rotation and time of each point."""
-    q, r, count = table.shape[1] - 1, shapes.shape[2], plan.delays.size
+def coefficients(rows, forms, rubbing, plan, places, points, table):
+    """Stiffness by delay (n, d, r, r), its sum's damping (n, r, r), and rotation and time of each point.
+
+    forms, rubbing : (w, 5, r, r), what each window pushes with, per displacement, and per velocity times the spindle's speed; rubbing has
+    no window where nothing rubs.
+    """
+    q, r, count = table.shape[1] - 1, forms.shape[2], plan.delays.size
     stiffness, damping = np.zeros((points, count, r, r)), np.zeros((points, r, r))
     angle, time = np.empty(points), np.empty(points)
-    weights, pair = np.empty(4), np.empty((2, 2, 2))
+    basis = np.empty(5)
     for e in range(places.shape[0]):
         if places[e, 3] < 0:
             continue
@@ -201,23 +203,19 @@ def coefficients(rows, shapes, plan, places, points, table):
             time[point] = places[e, 0] + h * (i // q + table[0, i % q])
             theta = places[e, 4] if i == 0 else end if i == steps * q else angle_at(time[point], plan)
             angle[point] = theta
-            swing = plan.swings * plan.speed
-            speed = plan.speed * (1.0 + plan.swing * math.sin(swing * time[point])) * plan.radius
-            weights[0], weights[1] = plan.depth * plan.k_tangential, plan.depth * plan.k_radial
-            weights[2], weights[3] = plan.depth * plan.c_tangential / speed, plan.depth * plan.c_radial / speed
+            speed = plan.speed * (1.0 + plan.swing * math.sin(plan.swings * plan.speed * time[point]))
             for w in range(rows.shape[0]):
-                for i1 in range(2):
-                    for i2 in range(2):
-                        pair[0, i1, i2] = pair[1, i1, i2] = 0.0
-                add_window(theta, middle, rows[w], plan, weights, pair)
+                for k in range(5):
+                    basis[k] = 0.0
+                if not add_window(theta, middle if rows[w, 6] > 0.0 else theta, rows[w], plan.spacing, basis):
+                    continue
                 d = int(rows[w, 5])
-                for a in range(r):
-                    for b in range(r):
-                        for i1 in range(2):
-                            for i2 in range(2):
-                                both = shapes[w, i1, a] * shapes[w, i2, b]
-                                stiffness[point, d, a, b] += both * pair[0, i1, i2]
-                                damping[point, a, b] += both * pair[1, i1, i2]
+                for k in range(5):
+                    for a in range(r):
+                        for b in range(r):
+                            stiffness[point, d, a, b] += basis[k] * forms[w, k, a, b]
+                            if rubbing.shape[0] > 0:
+                                damping[point, a, b] += basis[k] * rubbing[w, k, a, b] / speed
     if plan.frozen:
         # each step with its means: a step's nodes are its own, so the shared ones are kept by the step that starts there
         for e in range(places.shape[0]):
@@ -242,32 +240,60 @@ def coefficients(rows, shapes, plan, places, points, table):
 
 
 @numba.njit(cache=True)
-def lookups(plan, places, points, angle, time, table):
+def lookups(plan, places, points, angle, time, table, stiffness):
     """Where the points find what the tool did a delay ago: first point of a step (+ points, if in this period) and the weights there.
 
-    Where the first weight is 1 the point itself.
+    Where the first weight is 1 the point itself; -1 where the step of the point pushes nothing with that delay.
     """
-    q, count = table.shape[1] - 1, plan.delays.size
-    where = np.zeros((points, count), dtype=np.int64)
+    q, count, r = table.shape[1] - 1, plan.delays.size, stiffness.shape[2]
+    where = np.full((points, count), -1, dtype=np.int64)
     weight = np.zeros((points, count, q + 1))
+    starts = np.zeros(points, dtype=np.bool_)
+    cutting, inside = np.empty(places.shape[0], dtype=np.int64), 0
+    for e in range(places.shape[0]):
+        if places[e, 3] >= 0:
+            starts[int(places[e, 3])] = True
+            cutting[inside] = e
+            inside += 1
+    for e in range(places.shape[0]):
+        if places[e, 3] < 0:
+            continue
+        for step in range(int(places[e, 2])):
+            first = int(places[e, 3]) + step * q
+            for d in range(count):
+                pushes = False
+                for p in range(first, first + q + 1):
+                    for a in range(r):
+                        for b in range(r):
+                            pushes = pushes or stiffness[p, d, a, b] != 0.0
+                if pushes:
+                    for p in range(first, first + q + 1):
+                        where[p, d] = 0
     for p in range(points):
-        starts = _starts(places, p)
         for d in range(count):
+            if where[p, d] < 0:
+                continue
             back = angle[p] - plan.delays[d]
             # the period's first instant belongs to the points that start there, to all others the last one's end
-            now = back > (-1e-9 if starts else 1e-9)
+            now = back > (-1e-9 if starts[p] else 1e-9)
             if not now:
                 back += plan.period
             then = time_at(back, plan)
-            # the element in the cut that holds it, or comes nearest to it
+            # the element in the cut that holds it, or comes nearest to it: those that begin before it and after it, in order of time
+            low, high = 0, inside
+            while low < high:
+                half = (low + high) // 2
+                if places[cutting[half], 0] <= then:
+                    low = half + 1
+                else:
+                    high = half
             best, distance = -1, 1e300
-            for e in range(places.shape[0]):
-                if places[e, 3] < 0:
-                    continue
+            for k in range(max(low - 2, 0), min(low + 2, inside)):
+                e = cutting[k]
                 begin, length = places[e, 0], places[e, 1] * places[e, 2]
                 apart = max(begin - then, then - begin - length, 0.0)
                 # of two elements that touch there, a point that starts its own takes the one that starts
-                if apart < distance - 1e-12 * length or (starts and apart <= distance + 1e-12 * length):
+                if apart < distance - 1e-12 * length or (starts[p] and apart <= distance + 1e-12 * length):
                     best, distance = e, min(apart, distance)
             h, steps, first = places[best, 1], int(places[best, 2]), int(places[best, 3])
             x = min(max((then - places[best, 0]) / h, 0.0), float(steps))
@@ -293,24 +319,15 @@ def lookups(plan, places, points, angle, time, table):
 
 
 @numba.njit(cache=True)
-def _starts(places, point):
-    """Whether an element starts with this point."""
-    found = False
-    for e in range(places.shape[0]):
-        found = found or places[e, 3] == point
-    return found
-
-
-@numba.njit(cache=True)
-def lay_out(rows, shapes, plan, table):
+def lay_out(rows, forms, rubbing, plan, table):
     """Lay a cut out over its period.
 
     Parameters
     ----------
-    rows : array (w, 6)
+    rows : array (w, 7)
         Windows.
-    shapes : array (w, 2, r)
-        How the displacements that are kept move the edge there, in feed and normal direction.
+    forms, rubbing : arrays (w, 5, r, r)
+        What each pushes with, in the displacements that are kept; rubbing has none where nothing rubs.
     plan : CutPlan
 
     Returns
@@ -318,6 +335,6 @@ def lay_out(rows, shapes, plan, table):
     CutLayout
     """
     places, points = elements(rows, plan, table.shape[1] - 1)
-    stiffness, damping, angle, time = coefficients(rows, shapes, plan, places, points, table)
-    where, weight = lookups(plan, places, points, angle, time, table)
+    stiffness, damping, angle, time = coefficients(rows, forms, rubbing, plan, places, points, table)
+    where, weight = lookups(plan, places, points, angle, time, table, stiffness)
     return CutLayout(places, stiffness, damping, where, weight, time)

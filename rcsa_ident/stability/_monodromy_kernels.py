@@ -230,6 +230,8 @@ def march(state, motion, force, modes, layout, table, frozen, prepared):
                         free[0, 0, a] += y.real
                         free[1, 0, a] += (pole[k] * y).real
                 for d in range(delays):
+                    if where[start, d] < 0:
+                        continue
                     for b in range(r):
                         value = _earlier(motion, where, weight, start, d, b)
                         for a in range(r):
@@ -259,6 +261,8 @@ def march(state, motion, force, modes, layout, table, frozen, prepared):
                             y += echo[own, kind, j, 0, a, b] * force[start, b]
                         free[kind, j, a] = y
                 for d in range(delays):
+                    if where[node, d] < 0:
+                        continue
                     for b in range(r):
                         if frozen:
                             # what was there a delay ago changes linearly over the step

@@ -8,12 +8,13 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.conditions import same_everywhere
+from rcsa_ident.cutting.forms import Directions, lines_of_rows
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import receptance_at
 from rcsa_ident.stability.eigenvalue_tracking import Branches, Crossing, crossings_between
+from rcsa_ident.stability.regeneration import directions_of, regeneration
 
 #: Largest change of a harmonic's receptance from one frequency to the next, as a share of it and of the largest one.
 _STEP, _FLOOR = 0.25, 0.05
@@ -26,6 +27,8 @@ _LEAST, _HALVINGS = 25, 8
 _RANKS = 1.5
 #: Change of the first harmonic's phase by the helix [rad] beyond which the search is repeated with the depth found.
 _TURN = 0.05
+#: Change of the depth, as a share of it, beyond which it is repeated where the cutter has a shape.
+_CLOSE = 0.02
 #: Searches at one speed at most.
 _LOOKS = 6
 #: Steps of Newton's method for a crossing.
@@ -34,18 +37,18 @@ _NEWTON = 15
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipMotion:
-    """The tip's receptance at any frequency, entries xx, xy, yx, yy."""
+    """The tip's receptance at any frequency, its entries row by row, shape (n, r r)."""
 
     omega: FloatArray
     values: ComplexArray
 
     @classmethod
     def of(cls, receptance: Receptance) -> TipMotion:
-        entries = [receptance.between(f"tip.{a}", f"tip.{b}") for a in "xy" for b in "xy"]
+        r = len(receptance.rows)
         kept = np.flatnonzero(receptance.omega > 0.0)
         if kept.size < 2 or np.any(np.diff(receptance.omega[kept]) <= 0.0):
             raise InputError("tip receptance frequencies", f"{receptance.omega.size} frequencies", "two or more above 0, ascending")
-        values = np.stack(entries, axis=1)[kept]
+        values = receptance.values[kept].reshape(-1, r * r)
         if not np.all(np.isfinite(values)):
             raise InputError("tip receptance", "values that are not finite", "finite values at every frequency above 0")
         if not np.any(values):
@@ -56,48 +59,72 @@ class TipMotion:
     def size(self) -> float:
         return float(np.max(np.abs(self.values)))
 
+    @property
+    def directions(self) -> Directions:
+        return directions_of(round(np.sqrt(self.values.shape[1])))
+
     def at(self, omega: FloatArray) -> ComplexArray:
-        """Return the 2 x 2 receptances, shape (..., 2, 2)."""
-        flat = np.ascontiguousarray(omega.ravel())
-        return receptance_at(self.omega, self.values, flat).reshape(*omega.shape, 2, 2)
+        """Return the receptances, shape (..., r, r)."""
+        flat, r = np.ascontiguousarray(omega.ravel()), self.directions
+        return receptance_at(self.omega, self.values, flat).reshape(*omega.shape, r, r)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Harmonics:
+    """The harmonics of a cut's stiffness per depth, by delay, and of what it rubs with: n of them about zero.
+
+    Parameters
+    ----------
+    delay : array, shape (d,) [rad]
+    stiffness : complex array, shape (d, n, r, r) [N/m^2]
+    rubbing : complex array, shape (n, r, r), or None [N/m^2]
+        Per velocity, times the spindle's speed.
+    """
+
+    delay: FloatArray
+    stiffness: ComplexArray
+    rubbing: ComplexArray | None
+
+
 class PeriodicTeeth:
-    """The directional coefficients' harmonics of tooth passing."""
+    """A cut's stiffness as harmonics of the frequency with which it repeats itself: tooth passing, or the spindle's with unlike teeth.
 
-    process: MillingProcess
-    harmonics: int | None
+    Parameters
+    ----------
+    process : MillingProcess
+    harmonics : int or None
+        That are kept; None keeps all.
+    directions : 2, 3 or 5
+    """
 
-    def lines(self, count: int, depth: float) -> ComplexArray:
-        """Return [alpha_r] for r = -count..count, mean over the depth along the helix, in machine axes, shape (2 count + 1, 2, 2).
+    def __init__(self, process: MillingProcess, harmonics: int | None, directions: Directions) -> None:
+        self.process, self.kept, self.directions = process, harmonics, directions
+        #: How often a turn repeats itself.
+        self.base = process.cutter.teeth if process.cutter.equally_spaced else 1
+        #: By which the first harmonic is turned per depth [rad/m].
+        self.slope = 0.5 * self.base * process.cutter.largest_lag
+        self._latest: tuple[int, float] | None = None
+        self._harmonics: Harmonics | None = None
 
-        [alpha(t)] = sum_r [alpha_r] e^{i r w_T t}, one tooth's tip at immersion 0 when t = 0.
-        """
-        return self._lines(count, depth, 1.0, self.process.coefficients.radial_ratio)
+    def harmonics(self, count: int, depth: float) -> Harmonics:
+        """Return the harmonics -count..count, tooth 1 at immersion 0 with its tip when t = 0."""
+        if self._harmonics is None or self._latest != (count, depth):
+            self._latest, self._harmonics = (count, depth), self._computed(count, depth)
+        return self._harmonics
 
-    def rubbing(self, count: int, depth: float) -> ComplexArray:
-        """Return the same of process damping, over its strength and the cutting speed: force per width and velocity."""
-        damping = self.process.damping
-        return np.zeros((2 * count + 1, 2, 2), dtype=complex) if damping is None else self._lines(count, depth, damping.friction, 1.0)
-
-    def _lines(self, count: int, depth: float, tangential: float, radial: float) -> ComplexArray:
-        r = np.arange(-count, count + 1)
-        kept = np.abs(r) <= (count if self.harmonics is None else self.harmonics)
-        cutter, engagement = self.process.cutter, same_everywhere(self.process.engagement)
-        order = cutter.teeth * r
-        q = np.array([-2, 0, 2])
-        sc, ss, cc = np.array([0.25j, 0, -0.25j]), np.array([-0.25, 0.5, -0.25]), np.array([0.25, 0.5, 0.25])
-        form = tangential * np.array([[-sc, -cc], [ss, sc]]) - radial * np.array([[ss, sc], [sc, cc]])
-        # the integral of e^{i (q - m) phi} over the immersion
-        start, end = engagement.angles
-        n, half = q - order[:, None], 0.5 * (end - start)
-        window = 2.0 * half * np.exp(0.5j * n * (start + end)) * np.sinc(n * half / np.pi)
-        lines = cutter.teeth / (2.0 * np.pi) * np.einsum("rq,ijq->rij", window, form)
-        lag = order * depth * np.tan(cutter.helix) / cutter.diameter
-        lines *= (kept * np.exp(-1j * lag) * np.sinc(lag / np.pi))[:, None, None]
-        rotation = self.process.machine_from_feed
-        return rotation @ lines @ rotation.T
+    def _computed(self, count: int, depth: float) -> Harmonics:
+        order = np.arange(-count, count + 1)
+        kept = np.abs(order) <= (count if self.kept is None else self.kept)
+        known = regeneration(self.process, depth, self.directions)
+        rows = known.rows
+        delay, place = np.unique(np.round(rows.delay, 12), return_inverse=True)
+        per_depth = (kept / depth)[:, None, None, None] / rows.width[:, None, None]
+        members = (place == np.arange(delay.size)[:, None]).astype(float)
+        lines = per_depth * lines_of_rows(rows, known.stiffness, self.base * order)
+        stiffness = np.tensordot(members, lines, axes=(1, 1))
+        if known.rubbing is None:
+            return Harmonics(delay, stiffness, None)
+        return Harmonics(delay, stiffness, np.sum(per_depth * lines_of_rows(rows, known.rubbing, self.base * order), axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,19 +138,18 @@ class Limit:
 class Hill:
     """The eigenvalue problem of one spindle speed."""
 
-    def __init__(self, tip: TipMotion, teeth: PeriodicTeeth, passing: float) -> None:
-        self.tip, self.teeth, self.passing = tip, teeth, passing
-        process = teeth.process
-        speed = 0.5 * process.cutter.diameter * passing / process.cutter.teeth
-        #: Of process damping, force per width and velocity [N s/m^2].
-        self.viscosity = 0.0 if process.damping is None else process.damping.strength / speed
+    def __init__(self, tip: TipMotion, teeth: PeriodicTeeth, speed: float, guess: float) -> None:
+        self.tip, self.teeth, self.speed, self.guess = tip, teeth, speed, guess
+        #: Frequency with which the cut repeats itself.
+        self.passing = passing = teeth.base * speed
         count = int(np.ceil(tip.omega[-1] / passing)) + 1
         self.every = np.arange(-count, count)
         self.nodes, size = self._nodes(self.every)
         # the largest eigenvalue that a harmonic may have by itself
-        self.strength = 2.0 * process.coefficients.tangential * float(np.linalg.norm(teeth.lines(0, 0.0)[0], 2)) * size
-        if self.viscosity > 0.0:
-            rub = self.viscosity * float(np.linalg.norm(teeth.rubbing(0, 0.0)[0], 2))
+        mean = teeth.harmonics(0, guess)
+        self.strength = 2.0 * float(np.linalg.norm(mean.stiffness.sum(axis=0)[0], 2)) * size
+        if mean.rubbing is not None:
+            rub = float(np.linalg.norm(mean.rubbing[0], 2)) / speed
             self.strength = self.strength + rub * passing * np.abs(self.every + 0.5) * size
         self.heard = self._stronger(_SILENT * self.strength.max())
         self.loud = self._stronger(_LOUD * self.strength.max())
@@ -131,12 +157,12 @@ class Hill:
     def limit(self, max_depth: float) -> Limit | None:
         """Return the smallest depth up to `max_depth`.
 
-        It is looked for with the loud harmonics and the helix of a depth that is guessed, and refined with all harmonics
-        and its own helix; where the guess was far off, it is looked for again.
+        It is looked for with the loud harmonics and the helix (and shape) of a depth that is guessed, and refined with all harmonics
+        and its own; where the guess was far off, it is looked for again.
         """
-        slope = self.teeth.process.cutter.teeth * np.tan(self.teeth.process.cutter.helix) / self.teeth.process.cutter.diameter
         found: list[Limit] = []
-        looked, best, lost = 0.0, None, None
+        looked, best, lost = self.guess, None, None
+        plain = self.teeth.process.is_plain
         for _ in range(_LOOKS):
             refined: list[Limit] = []
             for crossing in sorted(self._crossings(looked, max_depth), key=lambda c: -c.value):
@@ -153,13 +179,18 @@ class Hill:
             wanted = self.heard if lost is not None else self._stronger(_LOUD / depth)
             if lost is not None:
                 depth = lost.depth
-            elif wanted.size <= self.loud.size and (best is None or abs(depth - looked) * slope <= _TURN):
+            elif wanted.size <= self.loud.size and (best is None or self._near(depth, looked, plain)):
                 break
             looked = depth
             if wanted.size > self.loud.size:
                 self.loud = wanted
         answer = best if lost is None else lost
         return answer if answer is not None and answer.depth <= max_depth else None
+
+    def _near(self, depth: float, looked: float, plain: bool) -> bool:
+        """Whether what was looked at with one depth holds for another."""
+        alike = abs(depth - looked) * self.teeth.slope <= _TURN
+        return alike if plain else alike and abs(depth - looked) <= _CLOSE * depth
 
     def _stronger(self, strength: float) -> np.ndarray:
         """Harmonics up to the last whose own eigenvalue may be so large, at least two: harmonic -1 - l is the mirror of l."""
@@ -168,20 +199,28 @@ class Hill:
         return self.every[reach <= max(loud.max(initial=0.0), 1.0)]
 
     def matrices(self, offset: np.ndarray, omega: FloatArray, depth: float) -> ComplexArray:
-        """Return (K_tc (1 - e^{-i w T}) [alpha_{k-l}] + i (w + l w_T) C [beta_{k-l}]) G(w + l w_T), shape (n, 2 h, 2 h) [1/m].
+        """Return sum_d K_d[k - l] (1 - e^{-i (w + l w_b) tau_d}) G(w + l w_b) and what rubs beside it, shape (n, r h, r h) [1/m].
 
-        [beta] is what process damping makes of a velocity.
+        K_d are the harmonics of the stiffness per depth with the delay tau_d, w_b the frequency with which the cut repeats itself.
         """
-        h = offset.size
+        h, r = offset.size, self.teeth.directions
         apart = offset[:, None] - offset + h - 1
         frequency = omega[:, None] + self.passing * offset
         tip = self.tip.at(frequency)
-        regenerated = (self.teeth.process.coefficients.tangential * (1.0 - np.exp(-2j * np.pi * omega / self.passing)))[:, None, None, None]
-        wide = self.teeth.lines(h - 1, depth)[apart].transpose(1, 0, 2, 3).reshape(h, 2 * h, 2) @ (regenerated * tip)
-        if self.viscosity > 0.0:
-            moving = (1j * self.viscosity * frequency)[:, :, None, None] * tip
-            wide = wide + self.teeth.rubbing(h - 1, depth)[apart].transpose(1, 0, 2, 3).reshape(h, 2 * h, 2) @ moving
-        return wide.transpose(0, 2, 1, 3).reshape(omega.size, 2 * h, 2 * h)
+        known = self.teeth.harmonics(h - 1, depth)
+        # the first sign is that of the force on the tip: F = K (q - q(t - tau))
+        if known.delay.size == 1 and self.teeth.base > 1:
+            factor = 1.0 - np.exp(-1j * omega * known.delay[0] / self.speed)
+            wide = known.stiffness[0][apart].transpose(1, 0, 2, 3).reshape(h, r * h, r) @ (factor[:, None, None, None] * tip)
+        else:
+            factors = 1.0 - np.exp(-1j * frequency[:, None, :] * (known.delay / self.speed)[:, None])
+            each = known.stiffness[:, apart].transpose(2, 0, 1, 3, 4).reshape(h, known.delay.size, h * r * r)
+            together = factors.transpose(2, 0, 1) @ each
+            wide = together.reshape(h, omega.size, h * r, r).transpose(1, 0, 2, 3) @ tip
+        if known.rubbing is not None:
+            moving = (1j / self.speed * frequency)[:, :, None, None] * tip
+            wide = wide + known.rubbing[apart].transpose(1, 0, 2, 3).reshape(h, r * h, r) @ moving
+        return wide.transpose(0, 2, 1, 3).reshape(omega.size, r * h, r * h)
 
     def _nodes(self, offset: np.ndarray) -> tuple[FloatArray, FloatArray]:
         """Frequencies between which no harmonic's receptance changes much, and each harmonic's largest receptance."""
@@ -230,8 +269,8 @@ class Hill:
         w, start = crossing.low + crossing.share * (crossing.high - crossing.low), 1.0 / crossing.value
         values, left, right = scipy.linalg.eig(self.matrices(self.loud, np.array([w]), depth)[0], left=True)
         chosen = np.argmin(np.abs(values - crossing.value))
-        size = 2 * self.heard.size
-        inside = np.repeat(np.isin(self.heard, self.loud), 2)
+        size = self.teeth.directions * self.heard.size
+        inside = np.repeat(np.isin(self.heard, self.loud), self.teeth.directions)
         b, c = np.zeros(size, dtype=complex), np.zeros(size, dtype=complex)
         b[inside], c[inside] = left[:, chosen], right[:, chosen]
         place, a = w, start
@@ -248,7 +287,7 @@ class Hill:
             back = scipy.linalg.lu_solve(factors, target, trans=2, check_finite=False)
             x, y, g = forth[:-1], back[:-1], forth[-1]
             by_depth = matrix
-            if self.teeth.process.cutter.helix > 0.0:
+            if self.teeth.slope > 0.0 or not self.teeth.process.is_plain:
                 deeper = self.matrices(self.heard, np.array([place]), a + step_a)[0]
                 by_depth = matrix + a / step_a * (deeper - matrix)
             g_w = -np.vdot(y, a / step_w * (shifted - matrix) @ x)
@@ -270,5 +309,5 @@ class Hill:
     def _dominant(self, omega: float, force: ComplexArray) -> float:
         """The frequency at which the tip vibrates most."""
         frequency = omega + self.passing * self.heard
-        motion = np.linalg.norm(np.einsum("lij,lj->li", self.tip.at(frequency), force.reshape(-1, 2)), axis=1)
+        motion = np.linalg.norm(np.einsum("lij,lj->li", self.tip.at(frequency), force.reshape(-1, self.teeth.directions)), axis=1)
         return float(abs(frequency[np.argmax(motion)]))

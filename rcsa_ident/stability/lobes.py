@@ -7,13 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.conditions import widest
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.rows import rows_of
+from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes, known_modes
+from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes, fitted_modes, known_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 _ZERO_ORDER = ZeroOrder()
@@ -37,8 +40,9 @@ def stability_lobes(
     Parameters
     ----------
     tip : Receptance, UncertainReceptance or TipModes
-        Over ``tip.x`` and ``tip.y`` (machine axes) with their cross terms; a direction that is missing is rigid, further ones are left
-        aside. A method that needs modes gets those of a rational fit where a receptance is given, and its warnings say so.
+        Over ``tip.x`` and ``tip.y`` (machine axes) with their cross terms; a direction that is missing is rigid. Where the cutter has a
+        shape, ``tip.z`` and the slopes ``tip.x'`` and ``tip.y'`` count, too; else they are left aside. A method that needs modes gets
+        those of a rational fit where a receptance is given, and its warnings say so.
     process : MillingProcess
     speeds : array, shape (n,) [rad/s]
         In any order.
@@ -65,6 +69,10 @@ def stability_lobes(
     if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):
         raise InputError("speeds", speeds.tolist(), "one or more finite spindle speeds above 0 [rad/s]")
     max_depth = positive("max_depth", max_depth, "m")
+    if not process.is_plain:
+        # an edge that ends, teeth that meet, an engagement that the cutter cannot have: said before anything is computed
+        rows_of(process.cutter, process.engagement, max_depth, process.feed_per_tooth)
+        widest(process.engagement, process.cutter.outline, max_depth)
     found = _limits(tip, process, speeds, max_depth, method, draws, seed)
     # the smallest limit is the depth beside which a corner radius is seen
     return replace(found, warnings=(*found.warnings, *process.cutter.cylinder_remarks(float(found.nominal.min()))))
@@ -80,7 +88,8 @@ def _limits(
     seed: int,
 ) -> StabilityLobes:
     """What `stability_lobes` returns, of the cylinder."""
-    both = tip if isinstance(tip, TipModes) else both_directions(tip)
+    plain = process.is_plain
+    both = (tip.planar if plain else tip) if isinstance(tip, TipModes) else (both_directions if plain else all_directions)(tip)
     if isinstance(both, TipModes) or method.needs == "receptance":
         found = method.lobes(both, process, speeds, max_depth)
     else:
@@ -113,7 +122,7 @@ def drawn_limits(
     far apart where a quintic goes through it.
     """
     nodes, known = tip.thinned(), process.coefficients
-    tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes)
+    tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes, TIP if process.is_plain else known_directions(nodes))
     factors = None
     if known.tangential_spread or known.ratio_spread:
         # from draws of their own, so that machines are the same ones whatever is known of the coefficients
@@ -129,13 +138,27 @@ def both_directions(tip: Receptance) -> Receptance:
     return Receptance(tip.omega, embedded(tip.values, tip), TIP, TIP)
 
 
-def embedded(values: np.ndarray, tip: Receptance) -> np.ndarray:
-    """Return values of a tip's receptance, shape (..., r, c), among zeros for the directions that are missing, shape (..., 2, 2)."""
-    known = [(i, tip.rows.index(c), tip.cols.index(c)) for i, c in enumerate(TIP) if c in tip.rows and c in tip.cols]
-    if not known:
+def all_directions(tip: Receptance) -> Receptance:
+    """Return the tip's receptance in as many directions as it knows: 2, 3 with Z, 5 with slopes; one that is missing is rigid."""
+    wanted = known_directions(tip)
+    if tip.rows == wanted and tip.cols == wanted:
+        return tip
+    return Receptance(tip.omega, embedded(tip.values, tip, wanted), wanted, wanted)
+
+
+def known_directions(tip: Receptance) -> tuple[Coordinate, ...]:
+    """Return the directions that count of those that a tip's receptance has: 2, 3 with Z, 5 with slopes."""
+    known = set(tip.rows) & set(tip.cols)
+    return DIRECTIONS if known & set(DIRECTIONS[3:]) else DIRECTIONS[: 3 if DIRECTIONS[2] in known else 2]
+
+
+def embedded(values: np.ndarray, tip: Receptance, wanted: tuple[Coordinate, ...] = TIP) -> np.ndarray:
+    """Return values of a tip's receptance, shape (..., r, c), among zeros for the directions that are missing, shape (..., w, w)."""
+    known = [(i, tip.rows.index(c), tip.cols.index(c)) for i, c in enumerate(wanted) if c in tip.rows and c in tip.cols]
+    if not any(i < 2 for i, _, _ in known):
         found = ", ".join(str(c) for c in tip.rows)
         raise InputError("tip receptance", found, "tip.x, tip.y or both: at least one flexible direction")
-    embedded = np.zeros((*values.shape[:-2], 2, 2), dtype=complex)
+    embedded = np.zeros((*values.shape[:-2], len(wanted), len(wanted)), dtype=complex)
     for i, row, _ in known:
         for j, _, col in known:
             embedded[..., i, j] = values[..., row, col]

@@ -8,12 +8,12 @@ from functools import lru_cache
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.conditions import same_everywhere
-from rcsa_ident.cutting.force import regenerations
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.rows import Rows, rows_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability import _cut_kernels as kernels
 from rcsa_ident.stability import _monodromy_kernels
+from rcsa_ident.stability.regeneration import directions_of, regeneration, regeneration_of, sliced
 from rcsa_ident.stability.tip_modes import ModeArrays, TipModes
 
 #: Residual of the multiplier, as a share of it.
@@ -22,6 +22,8 @@ RESIDUAL = 1e-6
 _SWINGS = 60
 #: Cuts that are kept laid out.
 _KEPT = 512
+#: How often a depth that is surely stable is halved at most.
+_SMALLER = 60
 #: Slices of the edge per metre where modes have a shape along it.
 SLICES = 6000.0
 
@@ -72,38 +74,21 @@ class MonodromyOperator:
         self.table = lobatto(degree)
         #: By which power of the step the error falls.
         self.order = 2 if frozen else 2 * degree
-        equal = bool(np.ptp(cutter.pitch) < 1e-9)
-        uneven = bool(np.ptp(cutter.runout) > 0.0)
-        if uneven and process.feed_per_tooth is None:
+        if cutter.offset and process.feed_per_tooth is None:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
-        if uneven and process.engagement_profile is not None:
-            raise InputError("runout", cutter.runout.tolist(), "equal teeth beside an engagement that changes along the edge")
-        # (offset, start, end, delay) of the teeth that differ
-        engagement = same_everywhere(process.engagement)
-        entry, leave = engagement.angles
-        if equal and not uneven:
-            windows = [(0.0, entry, leave, float(cutter.pitch[0]))]
-            self.spacing = float(cutter.pitch[0])
-        else:
-            pieces = (
-                regenerations(cutter, process.feed_per_tooth, engagement)
-                if uneven and process.feed_per_tooth is not None
-                else [(j, entry, leave, 1) for j in range(cutter.teeth)]
-            )
-            windows = [(float(cutter.tooth_angle[j]), s, e, float(np.sum(np.roll(cutter.pitch, -j)[:back]))) for j, s, e, back in pieces]
-            self.spacing = 2.0 * np.pi
-        if not windows:
-            raise InputError("runout", cutter.runout.tolist(), "teeth that cut at all with this feed")
-        self.delays = np.unique(np.round([w[3] for w in windows], 12))
-        self.windows = [(o, s, e, int(np.argmin(np.abs(self.delays - d)))) for o, s, e, d in windows]
+        if modes.shape is not None or process.engagement_profile is not None:
+            _require_plain(process, "modes with a shape" if modes.shape is not None else "an engagement that changes along the edge")
+        self.spacing = float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi
         self.period = common_period(process, self.spacing)
+        #: Directions of the tip that count: a plain cut pushes and feels in its plane only.
+        self.count = directions_of(2 if process.is_plain else modes.directions)
+        modes = modes.planar if self.count == 2 else modes
         # a direction that does not move needs no place in the equations
-        self.rotation = process.machine_from_feed.T
         if modes.shape is None:
             moving = np.any(modes.outputs != 0.0, axis=1) | np.any(modes.constant != 0.0, axis=1)
             outputs, inputs = modes.outputs[moving], modes.inputs[:, moving]
             constant = modes.constant[np.ix_(moving, moving)]
-            self.directions = np.eye(2)[:, moving]
+            self.directions = np.eye(self.count)[:, moving]
         else:
             outputs, inputs, self.directions = _planar(modes)
             constant = np.zeros((modes.pole.size, modes.pole.size))
@@ -112,9 +97,8 @@ class MonodromyOperator:
         self.arrays = ModeArrays(
             modes.pole.copy(), np.ascontiguousarray(outputs / size), np.ascontiguousarray(inputs * size[:, None]), np.array(constant)
         )
-        self._straight: tuple[FloatArray, FloatArray] | None = None
         #: Whether all forces are proportional to the depth.
-        self.proportional = cutter.helix == 0.0 and process.engagement_profile is None and modes.shape is None
+        self.proportional = cutter.largest_lag == 0.0 and process.is_plain and process.engagement_profile is None and modes.shape is None
         self._unit: dict[tuple[float, float], kernels.CutLayout] = {}
 
     def duration(self, speed: float) -> float:
@@ -146,6 +130,8 @@ class MonodromyOperator:
             Of the eigenvalue, as a share of it, at which the search for it ends.
         """
         layout = self._laid_out(speed, depth, step)
+        if layout.time.size == 0:
+            return self._free(speed)
         first = np.zeros(0) if start is None else np.ascontiguousarray(start.real)
         value, left, _, vector, force = _monodromy_kernels.multiplier(self.arrays, layout, self.table, self.frozen, residual, waves, first)
         value = complex(value)
@@ -154,6 +140,12 @@ class MonodromyOperator:
         omega, motion = self._waves(value, speed, force, layout) if waves else (np.zeros(0), np.zeros(0))
         return Multiplier(value, self.duration(speed), vector, omega, motion, float(left))
 
+    def _free(self, speed: float) -> Multiplier:
+        """The multiplier of a tool that cuts nothing: its slowest mode dies away."""
+        duration = self.duration(speed)
+        slowest = self.arrays.pole[np.argmax(self.arrays.pole.real)]
+        return Multiplier(complex(np.exp(slowest * duration)), duration, np.zeros(0), np.array([abs(slowest)]), np.ones(1), 0.0)
+
     def _laid_out(self, speed: float, depth: float, step: float) -> kernels.CutLayout:
         """The cut over its period; without a helix it is laid out once for all depths, since every force grows with the depth."""
         if not self.proportional:
@@ -161,63 +153,55 @@ class MonodromyOperator:
         if (speed, step) not in self._unit:
             if len(self._unit) >= _KEPT:
                 self._unit.clear()
-            self._unit[speed, step] = self._lay_out(speed, 1.0, step)
-        unit = self._unit[speed, step]
-        return unit._replace(stiffness=depth * unit.stiffness, damping=depth * unit.damping)
+            self._unit[speed, step] = self._lay_out(speed, self.process.cutter.diameter, step)
+        unit, share = self._unit[speed, step], depth / self.process.cutter.diameter
+        return unit._replace(stiffness=share * unit.stiffness, damping=share * unit.damping)
 
     def _lay_out(self, speed: float, depth: float, step: float) -> kernels.CutLayout:
-        rows, shapes = self._rows(speed, depth)
-        found: kernels.CutLayout = kernels.lay_out(rows, shapes, self._plan(speed, depth, step), self.table)
+        windows, forms, rubbing, delays = self._windows(speed, depth)
+        found: kernels.CutLayout = kernels.lay_out(windows, forms, rubbing, self._plan(speed, step, delays), self.table)
         return found
 
-    def _plan(self, speed: float, depth: float, step: float) -> kernels.CutPlan:
-        process = self.process
-        c, d, v = process.coefficients, process.damping, process.speed_variation
+    def _plan(self, speed: float, step: float, delays: FloatArray) -> kernels.CutPlan:
+        v = self.process.speed_variation
         return kernels.CutPlan(
             period=self.period,
             spacing=self.spacing,
             speed=float(speed),
-            depth=float(depth),
-            lag=float(2.0 * np.tan(process.cutter.helix) / process.cutter.diameter),
-            k_tangential=float(c.tangential),
-            k_radial=float(c.tangential * c.radial_ratio),
-            c_tangential=0.0 if d is None else float(d.friction * d.strength),
-            c_radial=0.0 if d is None else float(d.strength),
-            radius=float(0.5 * process.cutter.diameter),
             swing=0.0 if v is None else float(v.amplitude),
             swings=0.0 if v is None else float(v.ratio),
             step=float(step),
             frozen=self.frozen,
-            delays=self.delays,
+            delays=delays,
         )
 
-    def _rows(self, speed: float, depth: float) -> tuple[FloatArray, FloatArray]:
-        """Windows and the directions that they push in, as the kernels want them."""
-        if self._straight is not None:
-            return self._straight
-        rows, shapes = [], []
-        for offset, start, end, delay in self.windows:
-            for upper, lower, opens, closes in self._slices(speed, depth, start, end):
-                rows.append((offset, opens, closes, upper, lower, delay))
-                shapes.append(self.rotation @ self._directions(0.5 * (upper + lower) * depth))
-        found = np.array(rows), np.array(shapes)
-        if self.process.engagement_profile is None and self.modes.shape is None:
-            self._straight = found
-        return found
+    def _windows(self, speed: float, depth: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Windows, what each pushes with and rubs with in the displacements that are kept, and the delays, as the kernels want them."""
+        rows = self._rows(speed, depth)
+        known = regeneration_of(self.process, rows, self.count)
+        delays, place = np.unique(np.round(rows.delay, 12), return_inverse=True)
+        splits = np.full(rows.count, float(self.process.cutter.serration is None))
+        windows = np.stack([rows.angle, rows.start, rows.end, rows.near, rows.far, place, splits], axis=1)
+        moved = self._directions(rows.z)
+        forms = [_projected(moved, form) for form in (known.stiffness, known.rubbing) if form is not None]
+        return windows, forms[0], forms[1] if len(forms) > 1 else np.zeros((0, *forms[0].shape[1:])), delays
 
-    def _slices(self, speed: float, depth: float, start: float, end: float) -> FloatArray:
-        if self.process.engagement_profile is not None:
-            return self.process.engagement_profile(speed, depth)
-        if self.modes.shape is None:
-            return np.array([[0.0, 1.0, start, end]])
-        edges = np.linspace(0.0, 1.0, max(2, int(np.ceil(SLICES * depth))) + 1)
-        return np.stack([edges[:-1], edges[1:], np.full(edges.size - 1, start), np.full(edges.size - 1, end)], axis=1)
+    def _rows(self, speed: float, depth: float) -> Rows:
+        process = self.process
+        rows = rows_of(process.cutter, process.engagement, depth, process.feed_per_tooth, along=self.count == 5)
+        if process.engagement_profile is not None:
+            return sliced(rows, process.engagement_profile(speed, depth))
+        if self.modes.shape is not None:
+            edges = np.linspace(0.0, 1.0, max(2, int(np.ceil(SLICES * depth))) + 1)
+            return sliced(rows, np.stack([edges[:-1], edges[1:]], axis=1))
+        return rows
 
-    def _directions(self, height: float) -> FloatArray:
+    def _directions(self, height: FloatArray) -> FloatArray:
+        """How the displacements that are kept move the edge at heights, shape (n or 1, directions, kept)."""
         if self.modes.shape is None or self.modes.heights is None:
-            return self.directions
-        share = np.array([np.interp(height, self.modes.heights, each) for each in self.modes.shape.T])
-        return self.directions * share
+            return self.directions[None]
+        heights = self.modes.heights
+        return self.directions * np.stack([np.interp(height, heights, each) for each in self.modes.shape.T], axis=1)[:, None]
 
     def _waves(self, value: complex, speed: float, force: ComplexArray, layout: kernels.CutLayout) -> tuple[FloatArray, FloatArray]:
         """Frequencies of the vibration, and the tip's amplitude at each, from the force's lines and the modes."""
@@ -247,9 +231,35 @@ class MonodromyOperator:
 
 def stable_depth_bound(modes: TipModes, process: MillingProcess) -> float:
     """A depth at which nothing can grow: the gain round the loop is below one at every frequency [m]."""
-    c = process.coefficients
-    teeth = max(1.0, np.ceil((process.widest.exit - process.widest.entry) / float(np.min(process.cutter.pitch))))
-    return float(0.9 / (2.0 * teeth * c.tangential * np.hypot(1.0, c.radial_ratio) * modes.largest))
+    if process.is_plain:
+        c, widest = process.coefficients, process.widest
+        teeth = max(1.0, np.ceil((widest.exit - widest.entry) / float(np.min(process.cutter.pitch))))
+        return float(0.9 / (2.0 * teeth * c.tangential * np.hypot(1.0, c.radial_ratio) * modes.planar.largest))
+    depth = min(0.5 * process.cutter.outline.height, process.cutter.diameter)
+    for _ in range(_SMALLER):
+        try:
+            strongest = regeneration(process, depth, directions_of(modes.directions)).strongest
+        except InputError:
+            # teeth that meet do not at a smaller depth
+            strongest = np.inf
+        if 2.0 * strongest * modes.largest < 0.9:
+            return depth
+        depth *= 0.5
+    raise InputError("tip modes", "a tip that any cut makes vibrate", "a stiffness beside which that of a thin cut is small")
+
+
+def _projected(moved: FloatArray, forms: FloatArray) -> FloatArray:
+    """Return moved^T form moved of each row and part, shape (n, 5, kept, kept)."""
+    found: FloatArray = moved.transpose(0, 2, 1)[:, None] @ forms @ moved[:, None]
+    return np.ascontiguousarray(found)
+
+
+def _require_plain(process: MillingProcess, beside: str) -> None:
+    cutter = process.cutter
+    if cutter.offset:
+        raise InputError("runout", cutter.runout.tolist(), f"equal teeth beside {beside}")
+    if not process.is_plain:
+        raise InputError("cutter", str(cutter), f"a cylinder and one engagement beside {beside}")
 
 
 def common_period(process: MillingProcess, spacing: float) -> float:

@@ -11,16 +11,19 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.stability.depth_march import finer, ladder, march
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
 from rcsa_ident.stability.methods import MethodName, Watch, coarse_to_fine
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes, receptance_of
+from rcsa_ident.stability.tip_modes import TIP, TipModes, receptance_of
 
 #: Share of the peak that the receptance may still have at the top of its band: 15 % there changed limits by 0.1 %, 57 % by 6 %.
 _LEFT = 0.2
 #: Of a speed, as counted on identified machines: frequencies that matrices are asked at, and rows for each harmonic below the receptance's
 #: end (two directions, both signs, but for those that are silent).
 _MATRICES, _ROWS = 100.0, 3.2
+#: Depth of a plain cut whose helix does not show [m].
+_THIN = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,7 @@ class MultiFrequency:
 
     def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
         """Return the matrices of each speed times the cubes of their sizes: what their eigenvalues cost."""
-        passing = process.cutter.teeth * speeds
+        passing = (process.cutter.teeth if process.cutter.equally_spaced else 1) * speeds
         reach = top / passing if self.harmonics is None else np.full(speeds.size, float(self.harmonics))
         return _MATRICES * (4.0 + _ROWS * reach) ** 3
 
@@ -74,32 +77,41 @@ class MultiFrequency:
         if process.engagement_profile is not None:
             allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
             raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
-        if np.ptp(cutter.pitch) > 1e-9:
-            raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: full-discretisation takes any")
-        motion = TipMotion.of(receptance_of(tip, wide=True))
-        teeth = PeriodicTeeth(process, self.harmonics)
+        receptance = receptance_of(tip, wide=True)
+        if process.is_plain:
+            receptance = receptance.block(TIP)
+        motion = TipMotion.of(receptance)
+        teeth = PeriodicTeeth(process, self.harmonics, motion.directions)
+        guesses = _guesses(receptance, process, speeds, max_depth)
         limit = np.full(speeds.size, np.inf)
         chatter = np.full(speeds.size, np.nan)
         lobe = np.full(speeds.size, -1, dtype=np.intp)
         lost = 0
         for i in coarse_to_fine(speeds.size):
-            passing = cutter.teeth * float(speeds[i])
-            found = Hill(motion, teeth, passing).limit(max_depth)
+            speed = float(speeds[i])
+            found = Hill(motion, teeth, speed, float(guesses[i])).limit(max_depth)
             if found is not None:
                 limit[i] = found.depth
                 chatter[i] = np.nan if found.chatter is None else found.chatter
-                lobe[i] = -1 if found.chatter is None else int(found.chatter / passing)
+                lobe[i] = -1 if found.chatter is None else int(found.chatter / (cutter.teeth * speed))
                 lost += found.chatter is None
             if self.watch is not None:
-                self.watch(float(speeds[i]), float(limit[i]), float(chatter[i]))
+                self.watch(speed, float(limit[i]), float(chatter[i]))
         doubts = _doubts(motion, chatter)
-        if np.ptp(cutter.runout) > 0.0:
-            doubts.append("run-out is left out: the limit is that of equal teeth")
         if lost:
             doubts.append(f"at {lost} of {speeds.size} speeds the limit is not converged: it may be percents off")
-        # a flip vibrates at an odd multiple of half the tooth-passing frequency, and nothing else does to the last digit
-        flip = np.abs(chatter / (cutter.teeth * speeds) % 1.0 - 0.5) < 1e-9
+        # a flip vibrates at an odd multiple of half the frequency with which the cut repeats itself, and nothing else quite does
+        flip = np.abs(chatter / (teeth.base * speeds) % 1.0 - 0.5) < 1e-9
         return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, warnings=tuple(doubts), flip=flip)
+
+
+def _guesses(receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> FloatArray:
+    """Depths near which the limits are looked for at first: where the stiffness changes with the depth, those of the zero order."""
+    if process.is_plain:
+        return np.full(speeds.size, _THIN)
+    steps = ladder(process, receptance.values.shape[1], max_depth)
+    found = march(*finer(receptance), process, steps, speeds).limit
+    return np.where(np.isfinite(found), found, max_depth)
 
 
 def _doubts(tip: TipMotion, chatter: FloatArray) -> list[str]:

@@ -144,7 +144,8 @@ def _limit(
         return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance, careful_from=islands_from(cut.process)), step, True
     # a search that is a little too deep and a little rough, then the limit from where it ended
     step = longest_step(cut)
-    depth = first_loss(Growth(cut, speed, step, ROUGH), low, 1.1 * max_depth, 10.0 * tolerance, careful_from=islands_from(cut.process))
+    deepest = min(1.1 * max_depth, cut.process.cutter.outline.height)
+    depth = first_loss(Growth(cut, speed, step, ROUGH), low, deepest, 10.0 * tolerance, careful_from=islands_from(cut.process))
     if depth is None:
         return None, step, True
     for _ in range(_REPEATS):
@@ -152,7 +153,7 @@ def _limit(
         found = _polished(growth, depth, tolerance)
         if found is None:
             # not there with the finer step: looked for again
-            depth = first_loss(growth, low, 1.1 * max_depth, tolerance, careful_from=islands_from(cut.process))
+            depth = first_loss(growth, low, deepest, tolerance, careful_from=islands_from(cut.process))
             if depth is None:
                 return None, step, True
             found = depth, (growth(1.01 * depth) - growth(0.99 * depth)) / (0.02 * depth)

@@ -22,7 +22,9 @@ LINES_PER_BANDWIDTH = 10.0
 MOST_LINES = 200_000
 #: How far above the highest mode the harmonics of a force are looked at, and the ratio of frequencies up there.
 _ABOVE, _STRETCH = 10.0, 1.03
-TIP = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
+#: Directions in which a tip may move: two of them count where a cut is plain, three or all where its edges have a shape.
+DIRECTIONS = tuple(Coordinate("tip", dof) for dof in (Dof.X, Dof.Y, Dof.Z, Dof.SLOPE_X, Dof.SLOPE_Y))
+TIP = DIRECTIONS[:2]
 #: What a fit of a receptance may be beside it, root mean square.
 FIT_TOLERANCE = 2e-3
 #: How far poles that are known without a fit may be beside the receptance: materials lose a constant share, modes one that grows with
@@ -34,12 +36,13 @@ DAMPED_OUTSIDE = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TipModes(PoleResidue):
-    """The tip's 2 x 2 receptance in machine axes X and Y as damped modes; along the edge they may have a shape.
+    """The tip's receptance in r machine directions as damped modes; along the edge they may have a shape.
 
     Parameters
     ----------
     pole, outputs, inputs, constant
-        As in `PoleResidue`, outputs (2, m), inputs (m, 2), real parts of the poles negative.
+        As in `PoleResidue`, outputs (r, m), inputs (m, r), real parts of the poles negative; the r of them are 2 (X and Y), 3 (with Z)
+        or 5 (with the slopes x' and y').
     heights : array, shape (k,) [m], default none
         Distances from the tip along the edge, ascending.
     shape : array, shape (k, m) [-], default none
@@ -53,8 +56,8 @@ class TipModes(PoleResidue):
     def __post_init__(self) -> None:
         PoleResidue.__post_init__(self)
         m = self.pole.size
-        if self.constant.shape != (2, 2):
-            raise InputError("constant", self.constant.shape, "shape (2, 2)")
+        if self.constant.shape not in ((2, 2), (3, 3), (5, 5)):
+            raise InputError("constant", self.constant.shape, "shape (2, 2), (3, 3) with Z, or (5, 5) with Z and the slopes")
         if m == 0 or not np.any(self.outputs) or not np.any(self.inputs):
             raise InputError("tip modes", "none that moves the tip", "at least one flexible direction")
         if not np.all(self.pole.real < 0.0):
@@ -70,6 +73,8 @@ class TipModes(PoleResidue):
                 raise InputError("shape", self.shape.shape, f"shape {(self.heights.size, m)}: heights, modes")
             if np.any(self.constant):
                 raise InputError("constant", "not zero", "zero beside modes that have a shape along the edge")
+            if self.directions != 2:
+                raise InputError("constant", self.constant.shape, "shape (2, 2) beside modes that have a shape along the edge")
 
     @classmethod
     def of(cls, models: Mapping[Dof, ModalModel]) -> TipModes:
@@ -78,16 +83,34 @@ class TipModes(PoleResidue):
         Parameters
         ----------
         models : mapping of Dof to ModalModel
-            With ``tip.x`` and ``tip.y``.
+            With ``tip.x`` and ``tip.y``, and ``tip.z``; where one of them has the tip's slope, slopes count.
         """
+        told = {coordinate for model in models.values() for coordinate in model.coordinates}
+        count = 5 if told & set(DIRECTIONS[3:]) else 3 if DIRECTIONS[2] in told else 2
         parts = []
         for axis, model in models.items():
-            turn = np.zeros((2, len(model.coordinates)))
-            turn[int(axis is Dof.Y), model.coordinates.index(Coordinate("tip", axis))] = 1.0
+            if Coordinate("tip", axis) not in model.coordinates:
+                raise InputError("tip modes", f"a model of {axis} without tip.{axis}", f"one with tip.{axis}")
+            turn = np.zeros((count, len(model.coordinates)))
+            for i, direction in enumerate(DIRECTIONS[:count]):
+                if direction in model.coordinates and direction.dof.plane is axis:
+                    turn[i, model.coordinates.index(direction)] = 1.0
             parts.append(model.pole_residue().projected(turn, turn.T))
         if not parts:
             raise InputError("tip modes", "none", "at least one flexible direction")
         return cls.joined(parts)
+
+    @property
+    def directions(self) -> int:
+        """In how many directions the tip moves."""
+        return int(self.constant.shape[0])
+
+    @property
+    def planar(self) -> TipModes:
+        """The same in X and Y alone."""
+        if self.directions == 2:
+            return self
+        return TipModes(self.pole, self.outputs[:2], self.inputs[:, :2], self.constant[:2, :2])
 
     @property
     def strength(self) -> FloatArray:
@@ -114,7 +137,8 @@ class TipModes(PoleResidue):
         if wide:
             tail = np.arange(1, int(np.log(0.5 * _ABOVE) / np.log(_STRETCH)) + 1)
             omega = np.concatenate([omega, high * _STRETCH**tail])
-        return Receptance(omega, self.response(omega), TIP, TIP)
+        known = DIRECTIONS[: self.directions]
+        return Receptance(omega, self.response(omega), known, known)
 
     @property
     def largest(self) -> float:

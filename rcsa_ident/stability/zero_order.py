@@ -15,9 +15,10 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part, pitch_envelope
+from rcsa_ident.stability.depth_march import finer, ladder, march
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes, receptance_of
+from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes, receptance_of
 from rcsa_ident.units import to_rpm
 
 #: Teeth in the cut, on average, below which the mean directional matrix no longer tells the whole story.
@@ -48,6 +49,8 @@ class ZeroOrder:
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the lower envelope of all lobes in the range of `speeds`."""
+        if not process.is_plain:
+            return self._marched(receptance_of(tip), process, speeds, max_depth)
         cutter, coefficients = process.cutter, process.coefficients
         receptance = receptance_of(tip)
         omega, trace, determinant = _characteristic(receptance, _directions(process))
@@ -81,6 +84,49 @@ class ZeroOrder:
             withheld=unlike,
         )
 
+    def _marched(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
+        """Return the limits of a cut whose mean stiffness is not proportional to the depth."""
+        _constant_speed(process)
+        directions = receptance.values.shape[1]
+        found = march(*finer(receptance), process, ladder(process, directions, max_depth), speeds)
+        unlike = _unlike_teeth(process)
+        exists = np.isfinite(found.absolute)
+        return StabilityLobes(
+            speeds,
+            found.limit,
+            found.chatter,
+            found.lobe,
+            max_depth,
+            self.name,
+            absolute_limit=None if unlike else found.absolute,
+            absolute_frequency=found.frequency if exists and not unlike else None,
+            warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, found.frequency if exists else None)),
+            withheld=unlike,
+        )
+
+    def _marched_depths(
+        self,
+        omega: FloatArray,
+        tips: ComplexArray,
+        process: MillingProcess,
+        speeds: FloatArray,
+        max_depth: float,
+        factors: FloatArray | None,
+    ) -> FloatArray:
+        """Return what `depths` does for a shaped cut; its ladder is linear in K_tc and in k_rc."""
+        _constant_speed(process)
+        directions, known = tips.shape[-1], process.coefficients
+        whole = ladder(process, directions, max_depth)
+        half = ladder(replace(process, coefficients=replace(known, radial_ratio=0.5 * known.radial_ratio)), directions, max_depth)
+        names = DIRECTIONS[:directions]
+        limits = []
+        for k, values in enumerate(tips):
+            stiffness, ratio = (1.0, 1.0) if factors is None else factors[k]
+            own = stiffness * (whole.stiffness + 2.0 * (ratio - 1.0) * (whole.stiffness - half.stiffness))
+            drawn = finer(Receptance(omega, values, names, names))
+            limits.append(march(*drawn, process, whole._replace(stiffness=own), speeds).limit)
+        return np.array(limits)
+
     def depths(
         self,
         omega: FloatArray,
@@ -95,8 +141,8 @@ class ZeroOrder:
         Parameters
         ----------
         omega : array, shape (n,) [rad/s]
-        tips : complex array, shape (d, n, 2, 2) [m/N]
-            The receptances in X and Y; a rigid direction is zero.
+        tips : complex array, shape (d, n, r, r) [m/N]
+            The receptances in X and Y, and further directions where the cut is not plain; a rigid direction is zero.
         speeds : array, shape (m,) [rad/s]
             In any order.
         factors : array, shape (d, 2) [-], or None
@@ -107,6 +153,8 @@ class ZeroOrder:
         array, shape (d, m) [m]
             Infinite beyond `max_depth`.
         """
+        if not process.is_plain:
+            return self._marched_depths(omega, tips, process, speeds, max_depth, factors)
         alpha = np.repeat(_directions(process)[None], len(tips), axis=0)
         if factors is not None:
             alpha += (factors[:, 1] - 1.0)[:, None, None] * _of_ratio(process)
@@ -139,12 +187,17 @@ class ZeroOrder:
 
 def _directions(process: MillingProcess) -> FloatArray:
     """[alpha0] of a cut at constant speed."""
+    _constant_speed(process)
+    return mean_directional_matrix(process.cutter.teeth, same_everywhere(process.engagement), process.coefficients, process.feed_angle)
+
+
+def _constant_speed(process: MillingProcess) -> None:
+    """Raise `InputError` where the speed varies, or the engagement changes by a profile of its own."""
     if process.speed_variation is not None:
         raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
     if process.engagement_profile is not None:
         allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
         raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
-    return mean_directional_matrix(process.cutter.teeth, same_everywhere(process.engagement), process.coefficients, process.feed_angle)
 
 
 def _of_ratio(process: MillingProcess) -> FloatArray:
@@ -193,8 +246,15 @@ def _unlike_teeth(process: MillingProcess) -> str:
             f"unequal pitch ({'/'.join(f'{angle:.4g}' for angle in np.degrees(process.cutter.pitch))} degrees) is taken as the mean of its "
             "delays: limits can be twice as high as the true ones"
         )
-    if np.ptp(process.cutter.runout) > 0.0:
-        told.append("run-out is left out: the limit is that of equal teeth")
+    if np.ndim(process.cutter.helix) > 0:
+        helix = "/".join(f"{angle:.4g}" for angle in np.degrees(process.cutter.helices))
+        told.append(f"unequal helix ({helix} degrees) is taken as the mean of its delays: limits are 0.75 to 2.3 times the true ones")
+    if process.cutter.offset:
+        told.append(
+            "that teeth cut what those before the last one left is left out"
+            if process.cutter.serration is not None
+            else "run-out is left out: the limit is that of equal teeth"
+        )
     return f"{'; '.join(told)}; no depth is recommended from zero-order limits: full-discretisation takes unlike teeth" if told else ""
 
 

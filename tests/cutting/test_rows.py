@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.conditions import Block, Engagement, EngagementMap, Stepover
+from rcsa_ident.cutting.conditions import Block, Engagement, EngagementMap, Stepover, widest
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.forms import exponential_form, force_form, lines_of_rows, mean_over_turn, normal_form, product_form
 from rcsa_ident.cutting.profile import Profile
@@ -213,6 +213,13 @@ def test_a_waves_slope_is_that_of_its_offset(shape):
     assert offset[0] == pytest.approx(wave.at(z[:1] + 2e-3, 0.2)[0][0], abs=1e-15)
 
 
+def test_a_ball_that_does_not_reach_the_block_has_no_rows():
+    ball, beside = Cutter(2, 0.012, profile=Profile.ball(0.012)), Block(-0.006, -0.004)
+    reached = 0.006 - np.sqrt(0.006**2 - 0.004**2)
+    assert rows_of(ball, beside, 0.99 * reached).count == 0
+    assert rows_of(ball, beside, 1.01 * reached).count > 0
+
+
 def test_an_engagement_map_takes_several_arcs_at_a_height_and_nothing_above():
     table = EngagementMap([0.0, 0.0, 0.002, 0.002], np.array([0.1, 2.0, 0.3, 2.2]), np.array([0.9, 2.6, 1.1, 3.0]))
     found = table.arcs(np.full(3, 0.006), np.array([0.0, 0.001, 0.003]))
@@ -227,8 +234,7 @@ def test_an_engagement_map_takes_several_arcs_at_a_height_and_nothing_above():
         (lambda: rows_of(Cutter(2, 0.010, profile=Profile.chamfer(0.010, 0.002, 45 * DEG)), SLOT, 0.005), "depth"),
         (lambda: rows_of(Cutter(2, 0.012, helix=np.radians([0.0, 60.0])), SLOT, 0.012), "helix"),
         (lambda: rows_of(Cutter(3, 0.012, serration=Serration(0.2e-3, 2e-3)), SLOT, 0.002), "feed_per_tooth"),
-        (lambda: rows_of(Cutter(2, 0.012, profile=Profile.ball(0.012)), Block(0.010, 0.012), 0.002), "engagement"),
-        (lambda: rows_of(Cutter(2, 0.012, runout=[0.0, -1e-3]), Block(0.010, 0.012), 0.002, 1e-4), "engagement"),
+        (lambda: widest(Block(0.010, 0.012), Profile.ball(0.012), 0.006), "engagement"),
         (lambda: Block(0.001, 0.001), "y_from and y_to"),
         (lambda: Stepover(0.0, "down"), "width"),
         (lambda: Stepover(0.001, "left"), "strategy"),

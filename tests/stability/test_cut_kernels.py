@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.integrate
 
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
+from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.stability import _cut_kernels as kernels
 from rcsa_ident.stability.monodromy import MonodromyOperator, lobatto
 from tests.oracles import naive
@@ -26,29 +30,29 @@ CASES = {
 
 @pytest.fixture(params=CASES)
 def laid_out(request):
-    """Plan, windows, how they push, elements with their number of points, and the table of a cut."""
+    """Plan, windows, what they push and rub with, elements with their number of points, and the table of a cut."""
     cut = MonodromyOperator(tip(SKEWED), CASES[request.param], 4)
-    plan = cut._plan(SPEED, DEPTH, 2e-4)
-    rows, shapes = cut._rows(SPEED, DEPTH)
-    return plan, rows, shapes, *kernels.elements(rows, plan, 4), lobatto(4)
+    rows, forms, rubbing, delays = cut._windows(SPEED, DEPTH)
+    plan = cut._plan(SPEED, 2e-4, delays)
+    return plan, rows, forms, rubbing, *kernels.elements(rows, plan, 4), lobatto(4)
 
 
-def edge_sum(theta, row, plan, weights, slices=4000):
-    """The window's matrix by a sum over slices of the edge."""
-    offset, start, end, upper, lower = row[:5]
-    z = (upper + (lower - upper) * (np.arange(slices) + 0.5) / slices) * plan.depth
-    phi = theta + offset - plan.lag * z
+def edge_sum(theta, row, plan, form, slices=4000):
+    """What a window pushes with by a sum over slices of the edge."""
+    offset, start, end, near, far = row[:5]
+    phi = theta + offset - near - (far - near) * (np.arange(slices) + 0.5) / slices
     phi = start + np.mod(phi - start, plan.spacing)
-    total = np.zeros((2, 2))
+    total = np.zeros(form.shape[1:])
     for k in range(int(2.0 * np.pi / plan.spacing) + 1):
         # copies of the window that follow within a turn
         each = phi + k * plan.spacing
-        total += np.sum(naive.directional_integral(each, *weights) * (each < end)[:, None, None], axis=0)
-    return (lower - upper) / slices * total
+        basis = np.array([np.ones_like(each), np.cos(each), np.sin(each), np.cos(2.0 * each), np.sin(2.0 * each)])
+        total += np.tensordot(np.sum(basis * (each < end), axis=1), form, 1)
+    return total / slices
 
 
 def test_clock():
-    plan = MonodromyOperator(tip(SKEWED), CASES["straight"], 4)._plan(700.0, DEPTH, 2e-4)._replace(swing=0.8, swings=0.4)
+    plan = MonodromyOperator(tip(SKEWED), CASES["straight"], 4)._plan(700.0, 2e-4, np.zeros(0))._replace(swing=0.8, swings=0.4)
     for t in (0.0, 1e-3, 0.03, 0.4):
         angle, _ = scipy.integrate.quad(lambda u: 700.0 * (1.0 + 0.8 * np.sin(0.4 * 700.0 * u)), 0.0, t, epsabs=1e-12, limit=400)
         assert kernels.angle_at(t, plan) == pytest.approx(angle, abs=1e-9)
@@ -56,23 +60,34 @@ def test_clock():
     assert kernels.time_at(7.0, plan._replace(swing=0.0)) == pytest.approx(0.01)
 
 
-def test_matrices_of_a_window(laid_out):
-    plan, rows, _, places, _, _ = laid_out
-    weights = np.array([2.0, 0.7, 0.3, 1.1])
+def test_sums_of_a_window(laid_out):
+    plan, rows, _, _, places, _, _ = laid_out
+    units = np.eye(5)[:, :, None]
     for e, (_, _, _, first, angle) in enumerate(places):
         end = plan.period if e + 1 == len(places) else places[e + 1, 4]
         for part in (0.11, 0.83):
-            theta, total = angle + part * (end - angle), np.zeros((2, 2, 2))
-            for row in rows:
-                kernels.add_window(theta, 0.5 * (angle + end), row, plan, weights, total)
-            if first < 0:
-                np.testing.assert_array_equal(total, 0.0)
-            expected = [sum(edge_sum(theta, row, plan, w) for row in rows) for w in (weights[:2], weights[2:])]
+            theta, total = angle + part * (end - angle), np.zeros(5)
+            cuts = [kernels.add_window(theta, 0.5 * (angle + end), row, plan.spacing, total) for row in rows]
+            assert any(cuts) == (first >= 0)
+            expected = sum(edge_sum(theta, row, plan, units)[:, 0] for row in rows)
             np.testing.assert_allclose(total, expected, rtol=0, atol=2e-3 * len(rows))
 
 
+@pytest.mark.parametrize("radial_ratio", [0.0, 0.4])
+def test_what_a_straight_edge_pushes_with(radial_ratio):
+    """The forms are those of the textbook's directional coefficients."""
+    process = replace(mill(2, 0.5), coefficients=CuttingCoefficients(7e8, radial_ratio))
+    rows, forms, _, _ = MonodromyOperator(tip(SKEWED), process, 4)._windows(SPEED, DEPTH)
+    for phi in (1.7, 2.4, 3.0):
+        basis = np.array([1.0, np.cos(phi), np.sin(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)])
+        expected = DEPTH * naive.directional_integral(np.array([phi]), 7e8, 7e8 * radial_ratio)[0]
+        turn = process.machine_from_feed
+        np.testing.assert_allclose(np.tensordot(basis, forms[0], 1), turn @ expected @ turn.T, rtol=1e-12, atol=1e-6)
+    assert len(rows) == 1
+
+
 def test_elements_cover_the_period_and_end_where_teeth_do(laid_out):
-    plan, rows, _, places, points, _ = laid_out
+    plan, rows, _, _, places, points, _ = laid_out
     period = plan.period
     ends = np.append(places[1:, 0], kernels.time_at(period, plan))
     np.testing.assert_allclose(places[:, 0] + places[:, 1] * places[:, 2], ends, rtol=1e-12)
@@ -81,53 +96,67 @@ def test_elements_cover_the_period_and_end_where_teeth_do(laid_out):
     np.testing.assert_array_equal(cutting[:, 3], np.cumsum(np.concatenate([[0], 4 * cutting[:, 2] + 1]))[:-1])
     assert points == np.sum(4 * cutting[:, 2] + 1)
     angles = np.append(places[:, 4], period)
-    lag = plan.lag * plan.depth
     for row in rows:
         for phi in (row[1], row[2]):
-            for place in (phi - row[0], phi + lag - row[0]):
+            for place in (phi + row[3] - row[0], phi + row[4] - row[0]):
                 apart = np.abs(np.mod(angles - place + 0.5 * plan.spacing, plan.spacing) - 0.5 * plan.spacing)
                 assert apart.min() < 1e-9
 
 
 def test_coefficients_at_the_points(laid_out):
-    plan, rows, shapes, places, points, table = laid_out
-    stiffness, damping, angle, time = kernels.coefficients(rows, shapes, plan, places, points, table)
-    k = plan.depth * np.array([plan.k_tangential, plan.k_radial])
+    plan, rows, forms, rubbing, places, points, table = laid_out
+    stiffness, damping, angle, time = kernels.coefficients(rows, forms, rubbing, plan, places, points, table)
     swing = plan.swings * plan.speed
     # inside elements, not on the jumps at their ends
     inside = np.setdiff1d(np.arange(points), [p for _, _, n, f, _ in places for p in (f, f + 4 * n)])
     for p in inside[:: max(1, inside.size // 9)]:
         assert kernels.angle_at(time[p], plan) == pytest.approx(angle[p], abs=1e-10)
-        speed = plan.speed * (1.0 + plan.swing * np.sin(swing * time[p])) * plan.radius
-        c = plan.depth / speed * np.array([plan.c_tangential, plan.c_radial])
-        expected, rubbing = np.zeros(stiffness.shape[1:]), np.zeros((2, 2))
-        for row, shape in zip(rows, shapes, strict=True):
-            expected[int(row[5])] += shape.T @ edge_sum(angle[p], row, plan, k) @ shape
-            rubbing += shape.T @ edge_sum(angle[p], row, plan, c) @ shape
-        np.testing.assert_allclose(stiffness[p], expected, rtol=0, atol=2e-3 * len(rows) * k[0])
-        np.testing.assert_allclose(damping[p], rubbing, rtol=0, atol=2e-3 * len(rows) * max(c[1], 1e-30))
+        speed = plan.speed * (1.0 + plan.swing * np.sin(swing * time[p]))
+        expected, rubs = np.zeros(stiffness.shape[1:]), np.zeros(damping.shape[1:])
+        for w, row in enumerate(rows):
+            expected[int(row[5])] += edge_sum(angle[p], row, plan, forms[w])
+            if len(rubbing):
+                rubs += edge_sum(angle[p], row, plan, rubbing[w]) / speed
+        np.testing.assert_allclose(stiffness[p], expected, rtol=0, atol=4e-3 * len(rows) * np.abs(forms).max())
+        np.testing.assert_allclose(damping[p], rubs, rtol=0, atol=4e-3 * len(rows) * max(np.abs(rubbing).max(initial=0.0) / speed, 1e-30))
+
+
+def test_a_serrated_edges_windows_split_nothing_and_add_up():
+    """Its many windows open and close one after the other: a period is one element, and the points see those that are open there."""
+    wavy = replace(mill(3, 0.5, helix=0.5, feed_per_tooth=5e-5).cutter, serration=Serration(0.2e-3, 1.5e-3))
+    cut = MonodromyOperator(tip(SKEWED), replace(mill(3, 0.5, feed_per_tooth=5e-5), cutter=wavy), 4)
+    rows, forms, rubbing, delays = cut._windows(SPEED, DEPTH)
+    plan = cut._plan(SPEED, 1e-4, delays)
+    places, points = kernels.elements(rows, plan, 4)
+    assert len(places) == 1
+    stiffness, _, angle, _ = kernels.coefficients(rows, forms, rubbing, plan, places, points, lobatto(4))
+    for p in (5, 17, points // 2):
+        expected = np.zeros(stiffness.shape[1:])
+        for w, row in enumerate(rows):
+            expected[int(row[5])] += edge_sum(angle[p], row, plan, forms[w], 50)
+        np.testing.assert_allclose(stiffness[p], expected, rtol=0, atol=0.02 * np.abs(expected).max())
 
 
 def test_means_of_steps():
     """Semi-discretisation: what stands at a step's nodes is its mean, here against a fine sum."""
     cut = MonodromyOperator(tip(SKEWED), mill(2, 0.3, helix=0.5, damping=ProcessDamping(5e13, 6e-5)), 3, frozen=True)
-    plan, (rows, shapes) = cut._plan(SPEED, DEPTH, 1.5e-4), cut._rows(SPEED, DEPTH)
+    rows, forms, rubbing, delays = cut._windows(SPEED, DEPTH)
+    plan = cut._plan(SPEED, 1.5e-4, delays)
     places, points = kernels.elements(rows, plan, 3)
-    stiffness, damping, *_ = kernels.coefficients(rows, shapes, plan, places, points, lobatto(3))
+    stiffness, damping, *_ = kernels.coefficients(rows, forms, rubbing, plan, places, points, lobatto(3))
     one = next(row for row in places if row[3] >= 0 and row[2] >= 2)
     theta = one[4] + plan.speed * one[1] * (np.arange(200) + 0.5) / 200.0
-    weights = plan.depth * np.array([plan.k_tangential, plan.k_radial])
-    mean = np.mean([shapes[0].T @ edge_sum(t, rows[0], plan, weights) @ shapes[0] for t in theta], axis=0)
+    mean = np.mean([edge_sum(t, rows[0], plan, forms[0]) for t in theta], axis=0)
     for j in range(3):
-        np.testing.assert_allclose(stiffness[int(one[3]) + j, 0], mean, rtol=0, atol=1e-3 * weights[0])
+        np.testing.assert_allclose(stiffness[int(one[3]) + j, 0], mean, rtol=0, atol=2e-3 * np.abs(forms).max())
         np.testing.assert_array_equal(damping[int(one[3]) + j], damping[int(one[3])])
 
 
 def test_lookups_find_what_was_there_a_delay_ago(laid_out):
     """Polynomials of time of the table's degree are found exactly."""
-    plan, rows, shapes, places, points, table = laid_out
-    stiffness, _, angle, time = kernels.coefficients(rows, shapes, plan, places, points, table)
-    where, weight = kernels.lookups(plan, places, points, angle, time, table)
+    plan, rows, forms, rubbing, places, points, table = laid_out
+    stiffness, _, angle, time = kernels.coefficients(rows, forms, rubbing, plan, places, points, table)
+    where, weight = kernels.lookups(plan, places, points, angle, time, table, stiffness)
     period = kernels.time_at(plan.period, plan)
 
     def path(t):

@@ -208,7 +208,13 @@ def test_lines_of_the_directional_matrix(engagement):
     from rcsa_ident.stability.hill import PeriodicTeeth
 
     angle, depth = 0.4, 2e-3
-    straight = PeriodicTeeth(MillingProcess(Cutter(3, 0.012), COEFFICIENTS, engagement, angle), None).lines(400, depth)
+
+    def lines(cutter, count):
+        found = PeriodicTeeth(MillingProcess(cutter, COEFFICIENTS, engagement, angle), None, 2).harmonics(count, depth)
+        assert found.delay == pytest.approx([2.0 * np.pi / 3.0])
+        return found.stiffness[0] / COEFFICIENTS.tangential
+
+    straight = lines(Cutter(3, 0.012), 400)
     np.testing.assert_allclose(straight[400], mean_directional_matrix(3, engagement, COEFFICIENTS, angle), atol=1e-14)
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s], [s, c]])
@@ -218,7 +224,7 @@ def test_lines_of_the_directional_matrix(engagement):
         exact = sum((turn @ naive.directional_matrix(p, COEFFICIENTS.radial_ratio) @ turn.T for p in inside), np.zeros((2, 2)))
         series = np.einsum("rij,r->ij", straight, np.exp(3j * phi * np.arange(-400, 401)))
         np.testing.assert_allclose(series, exact, atol=0.01)
-    helical = PeriodicTeeth(MillingProcess(Cutter(3, 0.012, 0.6), COEFFICIENTS, engagement, angle), None).lines(20, depth)
+    helical = lines(Cutter(3, 0.012, 0.6), 20)
     lag = (np.arange(4000) + 0.5) / 4000 * 2.0 * depth * np.tan(0.6) / 0.012
     mean = np.exp(-3j * np.outer(np.arange(-20, 21), lag)).mean(axis=1)
     np.testing.assert_allclose(helical, straight[380:421] * mean[:, None, None], atol=1e-8)
@@ -265,7 +271,6 @@ def test_doubts_are_said():
         arguments = {"modes": TWO, "cutter": Cutter(2, 0.012), "engagement": SLOT, "rpm": [9000.0], **change}
         return any(word in w for w in lobes(**arguments).warnings)
 
-    assert said("run-out", cutter=Cutter(2, 0.012, runout=np.array([0.0, 1e-5])))
     assert said("ends at 960 Hz", top=962.0)
     assert said("coarse", step=25.0)
     assert not said("")
@@ -274,7 +279,7 @@ def test_doubts_are_said():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"process": MillingProcess(Cutter(2, 0.012, pitch=np.radians([170.0, 190.0])), COEFFICIENTS, SLOT)}, "equal pitch"),
+        ({"process": MillingProcess(Cutter(2, 0.012, runout=np.array([0.0, 1e-5])), COEFFICIENTS, SLOT)}, "which teeth cut"),
         ({"process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT, speed_variation=SpeedVariation(0.1, 0.1))}, "constant speed"),
         ({"tip": Receptance(tip(TWO).omega[::-1], tip(TWO).values, TIP, TIP)}, "ascending"),
         ({"tip": Receptance(tip(TWO).omega, tip(TWO).values * np.nan, TIP, TIP)}, "finite"),

@@ -5,7 +5,7 @@ import numpy as np
 from rcsa_ident.cutting.conditions import EngagementMap
 
 
-def tilted_ball(radius, depth, stepover, lead, tilt, heights=400, angles=14400):
+def tilted_ball(radius, depth, stepover, lead, tilt, heights=560, angles=14400):
     """Return arcs over the height in the tool's frame and the area across the feed, previous pass on the side -c.
 
     The surface normal s, the feed f and the cross direction c are the axes; the tool's axis is s turned by the lead about c, then by the
@@ -16,7 +16,7 @@ def tilted_ball(radius, depth, stepover, lead, tilt, heights=400, angles=14400):
     x = f - (f @ axis) * axis
     x /= np.linalg.norm(x)
     y = np.cross(axis, x)
-    kappa = np.radians(np.linspace(0.0, 60.0, heights))
+    kappa = np.radians(np.linspace(0.0, 85.0, heights))
     phi = (np.arange(angles) + 0.5) / angles * 2.0 * np.pi
     rows = []
     for k in kappa:
