@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from rcsa_ident.cutting.teeth import Edges, edges_at
 from rcsa_ident.errors import InputError
 
 #: Nodes of a piece of the outline, and one more for each of these angles that its edge lags [rad]; nodes of a wave of a serrated edge.
-NODES, _LAG, _WAVE = 8, 0.08, 256
+NODES, _LAG, WAVE = 8, 0.08, 256
 #: What of a wall is a wall [rad].
 _UPRIGHT = 1e-12
 
@@ -107,29 +108,65 @@ def rows_of(
     InputError
         If the depth is beyond the edge, teeth meet, or teeth are offset and no feed is told.
     """
-    outline = cutter.outline
-    if depth > outline.height * (1.0 + 1e-9):
-        raise InputError("depth", f"{1e3 * depth:g} mm", f"at most {1e3 * outline.height:g} mm, where the cutter's edge ends")
     rise = engagement.feed_rise if isinstance(engagement, EngagementMap) else 0.0
     if cutter.offset and feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
-    feed_per_tooth = 1.0 if feed_per_tooth is None else feed_per_tooth
-    found: list[FloatArray] = []
+    feed = 1.0 if feed_per_tooth is None else feed_per_tooth
+    pieces = places_of(cutter, engagement, depth, along, nodes)
+    found = [table for piece in pieces for table in _of_piece(cutter, piece, feed, rise)]
+    values = np.concatenate(found, axis=1) if found else np.zeros((len(COLUMNS), 0))
+    spacing = float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi
+    return Rows(**dict(zip(COLUMNS, values, strict=True)), spacing=spacing)
+
+
+class Places(NamedTuple):
+    """Places along a piece of a cutter's outline that stands in the cut, arrays of shape (n,), and where the teeth's edges are there.
+
+    Parameters
+    ----------
+    z, r, kappa, width
+        As of `Rows`.
+    edges : Edges
+    span : array, shape (teeth, n) [rad]
+        Half of the lag between the ends of what a place stands for; 0 where it is a point.
+    arcs : array, shape (k, n, 2) [rad]
+        Between which angles it cuts.
+    """
+
+    z: FloatArray
+    r: FloatArray
+    kappa: FloatArray
+    width: FloatArray
+    edges: Edges
+    span: FloatArray
+    arcs: FloatArray
+
+
+def places_of(
+    cutter: Cutter, engagement: AnyEngagement, depth: float, along: bool = False, nodes: int = NODES, wave: int = WAVE
+) -> list[Places]:
+    """Return places along the outline down to a depth, piece by piece; see `rows_of`.
+
+    Parameters
+    ----------
+    wave : int
+        Nodes of a wave of a serrated edge.
+    """
+    outline = cutter.outline
+    if depth > outline.height * (1.0 + 1e-9):
+        raise InputError("depth", f"{1e3 * depth:g} mm", f"at most {1e3 * outline.height:g} mm, where the cutter's edge ends")
+    found = []
     for segment, low, high in outline.pieces(depth, engagement.radii, engagement.heights):
         if not along and _is_wall(cutter, segment):
             share, width = np.array([0.5 * (low + high)]), np.array([(high - low) * segment.length])
         else:
-            share, width = _nodes(cutter, segment, low, high, nodes, bool(engagement.radii))
+            share, width = _nodes(cutter, segment, low, high, nodes, wave, bool(engagement.radii))
         r, z, kappa = segment.at(share)
-        edges = edges_at(cutter, z, kappa)
         # a wall as a whole, and cells of a wave, lag between their ends
         spans = share.size == 1 or cutter.serration is not None
         span = float(spans) * width * np.sin(kappa) * np.tan(cutter.helices)[:, None] / cutter.diameter
-        arcs = engagement.arcs(r, z)
-        found += _of_piece(cutter, edges, span, arcs, np.stack([z, r, kappa, width]), feed_per_tooth, rise)
-    values = np.concatenate(found, axis=1) if found else np.zeros((len(COLUMNS), 0))
-    spacing = float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi
-    return Rows(**dict(zip(COLUMNS, values, strict=True)), spacing=spacing)
+        found.append(Places(z, r, kappa, width, edges_at(cutter, z, kappa), span, engagement.arcs(r, z)))
+    return found
 
 
 def _is_wall(cutter: Cutter, segment: Segment) -> bool:
@@ -147,13 +184,15 @@ def _gauss(count: int) -> tuple[FloatArray, FloatArray]:
     return 0.5 * (node + 1.0), 0.5 * weight
 
 
-def _nodes(cutter: Cutter, segment: Segment, low: float, high: float, least: int, corners: bool) -> tuple[FloatArray, FloatArray]:
+def _nodes(
+    cutter: Cutter, segment: Segment, low: float, high: float, least: int, wave: int, corners: bool
+) -> tuple[FloatArray, FloatArray]:
     """Shares of the way along a segment, and the widths for which they stand."""
     _, z, _ = segment.at(np.array([low, high]))
     rise = float(z[1] - z[0])
     if cutter.serration is not None:
         # waves repeat themselves: equal steps, which stay where they are when the depth grows
-        step = cutter.serration.wavelength / (_WAVE * rise)
+        step = cutter.serration.wavelength / (wave * rise)
         ends = np.append(np.arange(0.0, 1.0 - 1e-9, step), 1.0)
         share, weight = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
     else:
@@ -165,12 +204,10 @@ def _nodes(cutter: Cutter, segment: Segment, low: float, high: float, least: int
     return low + (high - low) * share, weight * (high - low) * segment.length
 
 
-def _of_piece(
-    cutter: Cutter, edges: Edges, span: FloatArray, arcs: FloatArray, places: FloatArray, feed: float, rise: float
-) -> list[FloatArray]:
-    """Rows of the nodes of one piece, tables whose rows are the fields of `Rows`; places are z, r, kappa and width of the nodes."""
+def _of_piece(cutter: Cutter, piece: Places, feed: float, rise: float) -> list[FloatArray]:
+    """Rows of the places of one piece, tables whose rows are the fields of `Rows`."""
     found = []
-    z, r, kappa, width = places
+    z, r, kappa, width, edges, span, arcs = piece
     per_turn = feed * cutter.teeth / (2.0 * np.pi)
     # a feed towards the spindle takes the edge out of the material, the more the flatter it lies
     climb = np.sin(rise) / np.tan(kappa) if rise else np.zeros_like(z)

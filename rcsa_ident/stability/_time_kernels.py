@@ -15,7 +15,7 @@ import numpy as np
 
 
 class TimePlan(NamedTuple):
-    """A cut at a speed and a depth: what all its teeth share."""
+    """A cut at a speed: what all its teeth share."""
 
     #: Angle [rad].
     step: float
@@ -23,12 +23,13 @@ class TimePlan(NamedTuple):
     #: Forces per area, and per width.
     k_tangential: float
     k_radial: float
+    k_axial: float
     edge_tangential: float
     edge_radial: float
+    edge_axial: float
     #: Indentation force per width, times cutting speed over velocity into the material.
     rub: float
     friction: float
-    radius: float
     #: Amplitude and ratio of a varying speed.
     swing: float
     swings: float
@@ -38,99 +39,125 @@ class TimePlan(NamedTuple):
     regenerate: bool
 
 
+#: Columns of a piece of edge before those of the teeth ahead of it.
+PIECE = 9
+
+
 class Memory(NamedTuple):
     """What the next step begins with; a march changes it in place."""
 
     #: Complex, shape (m,).
     state: np.ndarray
-    #: Feed and normal, shape (2,).
+    #: In r directions, feed and normal first, shape (r,).
     force: np.ndarray
-    #: Ring of tips, feed and normal, at the steps before, shape (n, 2).
+    #: Ring of tips at the steps before, shape (n, r).
     past: np.ndarray
 
 
 @numba.njit(cache=True)
-def force_at(step, here, velocity, past, teeth, slices, plan, speed, out):
-    """Force on the tool (feed, normal) at a step.
+def force_at(step, here, velocity, past, pieces, plan, speed, normal, out):
+    """Force on the tool at a step, in r directions: feed and normal, with z, with the slopes.
 
     Parameters
     ----------
-    here, velocity : arrays (2,)
-        The tip, feed and normal.
-    past : array (n, 2)
-        Ring of tips, feed and normal, at the steps before this one, which has the number `step`.
-    teeth : array (z, 2 + 3 z)
-        Angle ahead of tooth 1, runout, then for each tooth ahead: steps ago, feed since then, its runout.
-    slices : array (s, 4)
-        Of the edge: angle by which it lags the tip, angles between which it cuts, width.
+    here, velocity : arrays (r,)
+        The tip.
+    past : array (n, r)
+        Ring of tips at the steps before this one, which has the number `step`.
+    pieces : array (s, 9 + 3 teeth)
+        Of each piece of a tooth's edge: angle ahead of tooth 1's tip, angles between which it cuts, width, sine and cosine of its normal's
+        angle, radius, height, radius by which it rubs, then for each tooth ahead: steps ago, feed since then, by how much less it stands
+        out.
     speed : float
         Of the spindle, now.
-    out : array (2,)
+    normal : array (r,)
+        Room for the outward normal of a piece.
+    out : array (r,)
     """
-    out[0], out[1] = 0.0, 0.0
-    size, count, theta = past.shape[0], teeth.shape[0], plan.step * step
-    rub = plan.rub / (speed * plan.radius)
-    for j in range(count):
-        for i in range(slices.shape[0]):
-            phi = (theta + teeth[j, 0] - slices[i, 0] + 0.5 * plan.step) % (2.0 * math.pi) - 0.5 * plan.step
-            # the share of the step about this place in which the tooth is inside: without it the entry would jump by a step
-            low, high = max(phi - 0.5 * plan.step, slices[i, 1]), min(phi + 0.5 * plan.step, slices[i, 2])
-            inside = (high - low) / plan.step
-            if inside <= 0.0:
-                continue
-            phi = 0.5 * (low + high)
-            s, c = math.sin(phi), math.cos(phi)
-            chip, nearest = 1e300, 1e300
-            for k in range(count):
-                ago, feed, other = teeth[j, 2 + 3 * k], teeth[j, 3 + 3 * k], teeth[j, 4 + 3 * k]
-                still, moved = feed * s + teeth[j, 1] - other, 0.0
-                if plan.regenerate:
-                    whole = int(ago)
-                    part = ago - whole
-                    a = (step - whole) % size
-                    b = (step - whole - 1) % size
-                    x = here[0] - (1.0 - part) * past[a, 0] - part * past[b, 0]
-                    y = here[1] - (1.0 - part) * past[a, 1] - part * past[b, 1]
-                    moved = s * x + c * y
-                # without loss of contact the surface that decides is that of a tool which does not vibrate
-                distance = still + moved if plan.leaves else still
-                if distance < nearest:
-                    nearest, chip = distance, still + moved
-            if nearest <= 0.0:
-                continue
-            tangential = plan.k_tangential * chip + plan.edge_tangential
-            radial = plan.k_radial * chip + plan.edge_radial
-            into = s * velocity[0] + c * velocity[1]
-            if not plan.leaves or into > 0.0:
-                radial += rub * into
-                tangential += plan.friction * rub * into
-            out[0] -= inside * slices[i, 3] * (tangential * c + radial * s)
-            out[1] += inside * slices[i, 3] * (tangential * s - radial * c)
+    size, count, theta, directions = past.shape[0], (pieces.shape[1] - PIECE) // 3, plan.step * step, here.size
+    for a in range(directions):
+        out[a] = 0.0
+    for i in range(pieces.shape[0]):
+        piece = pieces[i]
+        phi = (theta + piece[0] + 0.5 * plan.step) % (2.0 * math.pi) - 0.5 * plan.step
+        # the share of the step about this place in which the edge is inside: without it the entry would jump by a step
+        low, high = max(phi - 0.5 * plan.step, piece[1]), min(phi + 0.5 * plan.step, piece[2])
+        inside = (high - low) / plan.step
+        if inside <= 0.0:
+            continue
+        phi = 0.5 * (low + high)
+        s, c, sine, cosine, r, z = math.sin(phi), math.cos(phi), piece[4], piece[5], piece[6], piece[7]
+        normal[0], normal[1] = sine * s, sine * c
+        if directions > 2:
+            normal[2] = -cosine
+        if directions > 3:
+            lever = z * sine + r * cosine
+            normal[3], normal[4] = lever * s, lever * c
+        out_now = 0.0
+        for a in range(directions):
+            out_now += normal[a] * here[a]
+        chip, nearest = 1e300, 1e300
+        for k in range(count):
+            ago, feed, less = piece[PIECE + 3 * k], piece[PIECE + 1 + 3 * k], piece[PIECE + 2 + 3 * k]
+            still, moved = sine * (feed * s + less), 0.0
+            if plan.regenerate:
+                whole = int(ago)
+                part = ago - whole
+                first = (step - whole) % size
+                second = (step - whole - 1) % size
+                moved = out_now
+                for a in range(directions):
+                    moved -= normal[a] * ((1.0 - part) * past[first, a] + part * past[second, a])
+            # without loss of contact the surface that decides is that of a tool which does not vibrate
+            distance = still + moved if plan.leaves else still
+            if distance < nearest:
+                nearest, chip = distance, still + moved
+        if nearest <= 0.0:
+            continue
+        tangential = plan.k_tangential * chip + plan.edge_tangential
+        radial = plan.k_radial * chip + plan.edge_radial
+        axial = plan.k_axial * chip + plan.edge_axial
+        into = 0.0
+        for a in range(directions):
+            into += normal[a] * velocity[a]
+        if not plan.leaves or into > 0.0:
+            rub = plan.rub / (speed * piece[8])
+            radial += rub * into
+            tangential += plan.friction * rub * into
+        weight, inward = inside * piece[3], radial * sine + axial * cosine
+        feedwards, sidewards, upward = -tangential * c - inward * s, tangential * s - inward * c, radial * cosine - axial * sine
+        out[0] += weight * feedwards
+        out[1] += weight * sidewards
+        if directions > 2:
+            out[2] += weight * upward
+        if directions > 3:
+            out[3] += weight * (z * feedwards - r * upward * s)
+            out[4] += weight * (z * sidewards - r * upward * c)
 
 
 @numba.njit(cache=True)
-def simulate(modes, teeth, slices, plan, memory, start, samples):
+def simulate(modes, pieces, plan, memory, start, samples):
     """March `samples.shape[0]` steps on, from step number `start`.
 
     Parameters
     ----------
     modes, plan, memory : ModeArrays, TimePlan, Memory
         In feed and normal direction.
-    teeth, slices
+    pieces
         As in `force_at`.
-    samples : array (count, 6)
-        Written: tip, its velocity and the force, feed and normal, at each step.
+    samples : array (count, 3 r)
+        Written: tip, its velocity and the force, in r directions each, at each step.
     """
     pole, outputs, inputs, constant = modes
     state, force, past = memory
-    m, size = pole.size, past.shape[0]
+    m, size, r = pole.size, past.shape[0], past.shape[1]
     decay = np.empty(m, dtype=np.complex128)
-    before, now = np.empty((m, 2), dtype=np.complex128), np.empty((m, 2), dtype=np.complex128)
-    free, here, velocity, new = np.empty(m, dtype=np.complex128), np.empty(2), np.empty(2), np.empty(2)
-    jump = np.zeros((2, 2))
+    before, now = np.empty((m, r), dtype=np.complex128), np.empty((m, r), dtype=np.complex128)
+    free, here, velocity, new, normal = np.empty(m, dtype=np.complex128), np.empty(r), np.empty(r), np.empty(r), np.empty(r)
+    jump = np.zeros((r, r))
     for k in range(m):
-        for a in range(2):
-            for b in range(2):
+        for a in range(r):
+            for b in range(r):
                 jump[a, b] += (2.0 * outputs[a, k] * inputs[k, b]).real
     prepared = False
     time = 0.0
@@ -156,35 +183,48 @@ def simulate(modes, teeth, slices, plan, memory, start, samples):
                 else:
                     first = 1.0 + x * (0.5 + x / 6.0)
                     second = 0.5 + x * (1.0 / 6.0 + x / 24.0)
-                for b in range(2):
+                for b in range(r):
                     before[k, b] = h * (first - second) * inputs[k, b]
                     now[k, b] = h * second * inputs[k, b]
             prepared = True
         for k in range(m):
-            free[k] = decay[k] * state[k] + before[k, 0] * force[0] + before[k, 1] * force[1]
-        new[0], new[1] = force[0], force[1]
+            free[k] = decay[k] * state[k]
+            for b in range(r):
+                free[k] += before[k, b] * force[b]
+        for a in range(r):
+            new[a] = force[a]
         for _ in range(3):
-            for a in range(2):
-                here[a] = constant[a, 0] * new[0] + constant[a, 1] * new[1]
-                velocity[a] = jump[a, 0] * new[0] + jump[a, 1] * new[1]
-                for k in range(m):
-                    p = free[k] + now[k, 0] * new[0] + now[k, 1] * new[1]
+            for a in range(r):
+                here[a], velocity[a] = 0.0, 0.0
+                for b in range(r):
+                    here[a] += constant[a, b] * new[b]
+                    velocity[a] += jump[a, b] * new[b]
+            for k in range(m):
+                p = free[k]
+                for b in range(r):
+                    p += now[k, b] * new[b]
+                for a in range(r):
                     y = 2.0 * outputs[a, k] * p
                     here[a] += y.real
                     velocity[a] += (pole[k] * y).real
-            force_at(step, here, velocity, past, teeth, slices, plan, speed, new)
+            force_at(step, here, velocity, past, pieces, plan, speed, normal, new)
         for k in range(m):
-            state[k] = free[k] + now[k, 0] * new[0] + now[k, 1] * new[1]
-        force[0], force[1] = new[0], new[1]
-        for a in range(2):
-            here[a] = constant[a, 0] * new[0] + constant[a, 1] * new[1]
-            velocity[a] = jump[a, 0] * new[0] + jump[a, 1] * new[1]
+            state[k] = free[k]
+            for b in range(r):
+                state[k] += now[k, b] * new[b]
+        for a in range(r):
+            force[a] = new[a]
+            here[a], velocity[a] = 0.0, 0.0
+            for b in range(r):
+                here[a] += constant[a, b] * new[b]
+                velocity[a] += jump[a, b] * new[b]
             for k in range(m):
                 y = 2.0 * outputs[a, k] * state[k]
                 here[a] += y.real
                 velocity[a] += (pole[k] * y).real
+        for a in range(r):
             past[step % size, a] = here[a]
-            samples[n, a], samples[n, 2 + a], samples[n, 4 + a] = here[a], velocity[a], new[a]
+            samples[n, a], samples[n, r + a], samples[n, 2 * r + a] = here[a], velocity[a], new[a]
 
 
 @numba.njit(cache=True)

@@ -14,7 +14,7 @@ from rcsa_ident.cutting.rows import NODES, Rows, rows_of
 from rcsa_ident.errors import InputError
 
 #: Share of the radius below which the speed of a rubbing edge counts as that at this share: towards the axis it falls to nothing.
-_SLOWEST = 0.1
+SLOWEST = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ def regeneration_of(process: MillingProcess, rows: Rows, directions: Directions)
     stiffness = form(1.0, known.radial_ratio, known.axial_ratio, known.tangential * rows.width)
     rubbing = None
     if damping is not None:
-        radius = np.maximum(rows.r, _SLOWEST * process.cutter.outline.largest_radius)
+        radius = np.maximum(rows.r, SLOWEST * process.cutter.outline.largest_radius)
         rubbing = form(damping.friction, 1.0, 0.0, damping.strength * rows.width / radius)
     return Regeneration(rows, stiffness, rubbing)
 

@@ -8,9 +8,12 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.cutting.conditions import Engagement, same_everywhere
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_lines, runout_force_lines
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.segments import Arc
+from rcsa_ident.cutting.teeth import edges_at, lags
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Drawn
@@ -90,7 +93,13 @@ def surface_location_error(
     wall : Wall or None
         None takes the wall that the engagement has; of a slot's two the one where teeth leave.
     heights : int
-        Points over the depth; a straight edge has the same error at all of them.
+        Points over the depth, of a cutter with a shape over the part of it where its edge is a wall; a straight edge has the same error at
+        all of them.
+
+    Raises
+    ------
+    InputError
+        If the engagement leaves no wall, or the cutter none at this depth.
 
     Notes
     -----
@@ -98,19 +107,20 @@ def surface_location_error(
     regeneration drops out and the tip moves as x(t) = Re sum_m G(i m Omega) F_m e^{i m Omega t} with the force lines F_m of a
     rigid tool [schmitz1999], [mann2005]. A
     point of the wall is made by the edge that stands there, at immersion 0 (entry) or pi (exit): at height z that is at
-    Omega t = phi_wall - psi_j + 2 z tan(helix) / D. Of unequal teeth the one that cuts deepest leaves the wall.
+    Omega t = phi_wall - psi_j + lag(z). Of unequal teeth the one that cuts deepest leaves the wall.
     """
     if process.feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: the force grows with it")
     depth = positive("depth", depth, "m")
     if heights < 1:
         raise InputError("heights", heights, "1 or more")
-    side = _wall(same_everywhere(process.engagement), wall)
     cutter = process.cutter
+    height = np.linspace(_wall_begins(cutter, depth), depth, heights)
+    side = _wall(_at_the_wall(process, float(height[-1])), wall)
     speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
-    height = np.linspace(0.0, depth, heights)
     # angle of tooth 1 when tooth j makes the wall at a height, shape (teeth, heights)
-    angle = (np.pi if side is Wall.EXIT else 0.0) - cutter.tooth_angle[:, None] + 2.0 * height * np.tan(cutter.helix) / cutter.diameter
+    angle = (np.pi if side is Wall.EXIT else 0.0) - cutter.tooth_angle[:, None] + lags(cutter, height)
+    offset = edges_at(cutter, height, np.full(height.shape, 0.5 * np.pi)).offset
     outward = 1.0 if side is Wall.EXIT else -1.0
     normal = process.machine_from_feed[:, 1]
     response = _Tip(_from_dc(tip) if isinstance(tip, TipModes) else tip)
@@ -118,11 +128,11 @@ def surface_location_error(
     tail = 0.0
     for i, speed in enumerate(speeds.tolist()):
         orders = np.arange(min(int(response.omega[-1] / speed), MOST_ORDERS) + 1)
-        lines = runout_force_lines if np.ptp(cutter.runout) > 0.0 else force_lines
+        lines = runout_force_lines if cutter.offset else force_lines
         force = lines(cutter, process.conditions(speed, depth), process.coefficients, orders)
         line = np.einsum("m,mrc,rc->r", normal, response.at(orders * speed).transpose(1, 0, 2), force)
         moved = np.einsum("r,rjz->jz", line, np.exp(1j * orders[:, None, None] * angle)).real
-        error[i] = np.min(outward * moved - cutter.runout[:, None], axis=0)
+        error[i] = np.min(outward * moved - offset, axis=0)
         size = np.abs(line)
         tail = max(tail, float(size[3 * size.size // 4 :].sum() / max(size.sum(), 1e-300)))
     return SurfaceError(speeds, height, error, side, tuple(_doubts(process, response, speeds, tail)))
@@ -147,6 +157,26 @@ class _Tip:
         found[omega < self.omega[0]] = flat[0].real
         found[omega == 0.0] = flat[0].real
         return found.reshape(-1, 2, 2)
+
+
+def _wall_begins(cutter: Cutter, depth: float) -> float:
+    """The height above which the cutter's edge is a wall up to a depth [m]."""
+    begins = depth
+    for segment, low, _ in reversed(cutter.outline.pieces(depth)):
+        if abs(float(segment.at(np.array([low]))[2][0]) - 0.5 * np.pi) > 1e-9 or isinstance(segment, Arc):
+            break
+        begins = float(segment.at(np.array([low]))[1][0])
+    if begins >= depth:
+        allowed = "a depth at which the cutter's edge is a wall: elsewhere it leaves its own outline"
+        raise InputError("depth", f"{1e3 * depth:g} mm with {cutter}", allowed)
+    return begins
+
+
+def _at_the_wall(process: MillingProcess, height: float) -> Engagement:
+    """The engagement at a height of the wall."""
+    arcs = process.engagement.arcs(np.array([process.cutter.outline.radius_at(height)]), np.array([height]))[:, 0]
+    start, end = arcs[np.argmax(arcs[:, 1] - arcs[:, 0])]
+    return Engagement(float(start), float(end))
 
 
 def _wall(engagement: Engagement, wanted: Wall | None) -> Wall:
@@ -181,4 +211,4 @@ def _from_dc(modes: TipModes) -> Receptance:
     """The receptance of modes from 0 Hz to four times the highest, at frequencies that resolve the sharpest."""
     fine = modes.receptance().omega
     omega = np.arange(0.0, 2.0 * fine[-1], fine[1] - fine[0])
-    return Receptance(omega, modes.response(omega), TIP, TIP)
+    return Receptance(omega, modes.planar.response(omega), TIP, TIP)

@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.rows import Places, places_of
+from rcsa_ident.cutting.teeth import edges_at
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability import _time_kernels as kernels
 from rcsa_ident.stability.first_instability import first_loss
 from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES, LOOKS, MethodName, Watch, coarse_to_fine
 from rcsa_ident.stability.monodromy import common_period, stable_depth_bound
+from rcsa_ident.stability.regeneration import SLOWEST, directions_of, turned
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import ModeArrays, TipModes, require_modes
 
@@ -24,6 +27,8 @@ from rcsa_ident.stability.tip_modes import ModeArrays, TipModes, require_modes
 _STEPS, _FEWEST = 40.0, 60
 #: A mode counts whose own peak reaches this share of the strongest one's.
 _WEAK = 0.02
+#: Nodes of a wave of a serrated edge.
+_WAVE = 24
 #: Slices of the edge per angle that it lags over the depth [1/rad], at least one.
 _SLICES = 12.0
 #: Feed per tooth where none is given [m]; how far a cut is pushed off its steady state, and where it counts as chatter, as shares of it.
@@ -108,9 +113,8 @@ class TimeDomain:
         cutter = process.cutter
         steps = np.maximum(_FEWEST, _STEPS * ABOVE_TOP * top / (cutter.teeth * speeds))
         # limits are some part of the depths that are allowed
-        slices = 1.0 + 0.25 * _SLICES * 2.0 * max_depth * np.tan(cutter.helix) / cutter.diameter
-        uneven = np.ptp(cutter.pitch) > 1e-9 or np.ptp(cutter.runout) > 0.0
-        periods = 2.0 * self.periods + (_SETTLING * cutter.teeth if uneven else 0.0)
+        slices = 1.0 + 0.25 * _SLICES * max_depth * cutter.largest_lag
+        periods = 2.0 * self.periods + (0.0 if cutter.equally_spaced else _SETTLING * cutter.teeth)
         return LOOKS * periods * steps * (FITTED_MODES + cutter.teeth * slices)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
@@ -156,7 +160,8 @@ def milling_history(
     samples = run.march(int(np.ceil(positive("revolutions", revolutions) * cut.per_turn)))
     back = process.machine_from_feed.T
     angle = cut.step * (cut.per_turn + np.arange(samples.shape[0]))
-    return MillingHistory(cut.time(angle), angle, samples[:, :2] @ back, samples[:, 2:4] @ back, samples[:, 4:] @ back)
+    r = cut.directions
+    return MillingHistory(cut.time(angle), angle, *(samples[:, first : first + 2] @ back for first in (0, r, 2 * r)))
 
 
 @dataclass(slots=True, eq=False)
@@ -165,7 +170,7 @@ class _Run:
 
     cut: _Cut
     plan: kernels.TimePlan
-    slices: FloatArray
+    pieces: FloatArray
     memory: kernels.Memory
     number: int
 
@@ -173,7 +178,7 @@ class _Run:
         """Return a copy whose modes are pushed aside by about `push` [m] at the tip, and the surface that it left as well."""
         state, force, past = self.memory
         aside = push * np.exp(1j * np.arange(state.size))
-        return _Run(self.cut, self.plan, self.slices, kernels.Memory(state + aside, force.copy(), past + push), self.number)
+        return _Run(self.cut, self.plan, self.pieces, kernels.Memory(state + aside, force.copy(), past + push), self.number)
 
     def settle(self, tolerance: float) -> bool:
         """Go to the state that a period repeats, stable or not: Anderson's acceleration of one period after the other.
@@ -209,10 +214,10 @@ class _Run:
     @vector.setter
     def vector(self, values: FloatArray) -> None:
         state, force, past = self.memory
-        m = state.size
+        m, r = state.size, force.size
         state[:] = values[:m] + 1j * values[m : 2 * m]
-        force[:] = values[2 * m : 2 * m + 2] / self.cut.softness
-        past[self._newest_first] = values[2 * m + 2 :].reshape(-1, 2)
+        force[:] = values[2 * m : 2 * m + r] / self.cut.softness
+        past[self._newest_first] = values[2 * m + r :].reshape(-1, r)
 
     @property
     def _newest_first(self) -> NDArray[np.intp]:
@@ -220,9 +225,9 @@ class _Run:
         return (self.number - 1 - np.arange(count)) % count
 
     def march(self, count: int) -> FloatArray:
-        """Return tip, velocity and force of the next steps, feed and normal, shape (count, 6)."""
-        samples = np.empty((count, 6))
-        kernels.simulate(self.cut.arrays, self.cut.teeth, self.slices, self.plan, self.memory, self.number, samples)
+        """Return tip, velocity and force of the next steps, in feed, normal and further directions, shape (count, 3 r)."""
+        samples = np.empty((count, 3 * self.cut.directions))
+        kernels.simulate(self.cut.arrays, self.pieces, self.plan, self.memory, self.number, samples)
         self.number += count
         return samples
 
@@ -233,9 +238,12 @@ class _Cut:
     def __init__(self, modes: TipModes, process: MillingProcess, speed: float, leaves: bool) -> None:
         self.process, self.speed, self.leaves = process, speed, leaves
         self.feed = process.feed_per_tooth or _FEED
-        if process.feed_per_tooth is None and np.ptp(process.cutter.runout) > 0.0:
+        if process.feed_per_tooth is None and process.cutter.offset:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
-        turn = process.machine_from_feed
+        #: A plain cut pushes and feels in its plane only.
+        self.directions = directions_of(2 if process.is_plain else modes.directions)
+        modes = modes.planar if self.directions == 2 else modes
+        turn = turned(process, self.directions)
         outputs, inputs = turn.T @ modes.outputs, modes.inputs @ turn
         cutter, teeth = process.cutter, process.cutter.teeth
         # modes scaled so that each moves the tip alike
@@ -255,15 +263,7 @@ class _Cut:
         period = common_period(process, float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi)
         self.per_period = max(1, round(period / self.step))
         self.tooth_periods = self.per_period / tooth
-        self.teeth = np.empty((teeth, 2 + 3 * teeth))
-        for j in range(teeth):
-            ahead = (j + 1 + np.arange(teeth)) % teeth
-            back = np.cumsum(np.roll(cutter.pitch, -j))
-            pieces = np.stack([back / self.step, self.feed * teeth * back / (2.0 * np.pi), cutter.runout[ahead]], axis=1)
-            # a delay of a whole number of steps is one, in spite of rounding
-            whole = np.abs(pieces[:, 0] - np.round(pieces[:, 0])) < 1e-9 * pieces[:, 0]
-            pieces[whole, 0] = np.round(pieces[whole, 0])
-            self.teeth[j] = np.concatenate([[cutter.tooth_angle[j], cutter.runout[j]], pieces.ravel()])
+        self.radius = process.cutter.outline.largest_radius
 
     def time(self, angle: FloatArray) -> FloatArray:
         """Seconds from the rotation of 0 on."""
@@ -289,18 +289,19 @@ class _Cut:
             speed=float(self.speed),
             k_tangential=float(c.tangential),
             k_radial=float(c.tangential * c.radial_ratio),
+            k_axial=float(c.tangential * c.axial_ratio),
             edge_tangential=float(c.tangential_edge),
             edge_radial=float(c.radial_edge),
+            edge_axial=float(c.axial_edge),
             rub=0.0 if d is None else (2.0 if self.leaves else 1.0) * float(d.strength),
             friction=0.0 if d is None else float(d.friction),
-            radius=float(0.5 * process.cutter.diameter),
             swing=0.0 if v is None else float(v.amplitude),
             swings=0.0 if v is None else float(v.ratio),
             leaves=self.leaves,
             regenerate=False,
         )
-        memory = kernels.Memory(np.zeros_like(self.arrays.pole), np.zeros(2), np.zeros((self.per_turn + 2, 2)))
-        run = _Run(self, plan, self._slices(depth), memory, 0)
+        memory = kernels.Memory(np.zeros_like(self.arrays.pole), np.zeros(self.directions), np.zeros((self.per_turn + 2, self.directions)))
+        run = _Run(self, plan, self._pieces(depth), memory, 0)
         # from rest through one period of a force that knows no vibration: what is left decides on the state that repeats itself;
         # a period before that one, for a tooth may be in the cut where it begins
         turns = int(np.ceil(memory.past.shape[0] / self.per_period))
@@ -313,22 +314,47 @@ class _Cut:
         run.plan = plan._replace(regenerate=True)
         return run
 
-    def _slices(self, depth: float) -> FloatArray:
-        """Slices of the edge as the kernel wants them, shape (s, 4)."""
-        process = self.process
-        whole = 2.0 * depth * np.tan(process.cutter.helix) / process.cutter.diameter
-        count = max(1, int(np.ceil(_SLICES * whole)))
+    def _pieces(self, depth: float) -> FloatArray:
+        """Pieces of all teeth's edges as the kernel wants them, shape (s, 9 + 3 teeth)."""
+        cutter, teeth = self.process.cutter, self.process.cutter.teeth
+        found = []
+        for piece in self._places(depth):
+            # waves lean the edge and lengthen it, see `rows_of`
+            for j in range(teeth):
+                kappa = np.arctan2(np.sin(piece.kappa), np.cos(piece.kappa) + piece.edges.slope[j] * np.sin(piece.kappa))
+                width = piece.width * np.sin(piece.kappa) / np.sin(kappa)
+                ahead = (j + np.arange(teeth)) % teeth
+                back = np.cumsum(piece.edges.pitch[ahead], axis=0)
+                ago = back / self.step
+                # a delay of a whole number of steps is one, in spite of rounding
+                ago = np.where(np.abs(ago - np.round(ago)) < 1e-9 * ago, np.round(ago), ago)
+                less = piece.edges.offset[j] - piece.edges.offset[(ahead + 1) % teeth]
+                since = np.stack([ago, self.feed * teeth * back / (2.0 * np.pi), less], axis=1).reshape(3 * teeth, -1)
+                angle = cutter.tooth_angle[j] - piece.edges.lag[j]
+                slowest = np.maximum(piece.r, SLOWEST * self.radius)
+                for arc in piece.arcs:
+                    place = arc[:, 0], arc[:, 1], width, np.sin(kappa), np.cos(kappa), piece.r, piece.z, slowest
+                    found.append(np.concatenate([[angle, *place], since])[:, arc[:, 1] > arc[:, 0]])
+        return np.ascontiguousarray(np.concatenate(found, axis=1).T) if found else np.zeros((0, kernels.PIECE + 3 * teeth))
+
+    def _places(self, depth: float) -> list[Places]:
+        """Places along the edge: of a plain cut equal slices, with an engagement that changes along it if there is one."""
+        process, cutter = self.process, self.process.cutter
+        if not process.is_plain:
+            return places_of(cutter, process.engagement, depth, along=True, wave=_WAVE)
+        count = max(1, int(np.ceil(_SLICES * depth * cutter.largest_lag)))
         if process.engagement_profile is None:
             rows = np.array([[0.0, 1.0, *same_everywhere(process.engagement).angles]])
         else:
             rows = process.engagement_profile(self.speed, depth)
         each = int(np.ceil(count / len(rows)))
-        parts = [
-            [whole * upper + whole * (lower - upper) * (k + 0.5) / each, start, end, depth * (lower - upper) / each]
-            for upper, lower, start, end in rows
-            for k in range(each)
-        ]
-        return np.array(parts)
+        found = []
+        for upper, lower, start, end in rows:
+            z = depth * (upper + (lower - upper) * (np.arange(each) + 0.5) / each)
+            r, kappa, width = (np.full(each, value) for value in (0.5 * cutter.diameter, 0.5 * np.pi, depth * (lower - upper) / each))
+            arcs = np.broadcast_to(np.array([start, end]), (1, each, 2))
+            found.append(Places(z, r, kappa, width, edges_at(cutter, z, kappa), np.zeros((cutter.teeth, each)), arcs))
+        return found
 
     def growth(self, depth: float, periods: int) -> float:
         """Return the logarithm of the growth of a disturbance per tooth period."""
@@ -363,12 +389,16 @@ class _Cut:
         # teeth that differ, or rub, do not start in their steady state
         still.settle(1e-3 * push)
         pushed = still.pushed(push)
-        scale = np.array([1.0, 1.0, 1.0 / self.highest, 1.0 / self.highest])
+        r = self.directions
+        scale = np.concatenate([np.ones(r), np.full(r, 1.0 / self.highest)])
+        # slopes count by what they move at the cutter's radius
+        scale[3:r] *= self.radius
+        scale[r + 3 :] *= self.radius
         sizes, paths = [], []
         for _ in range(max(8, int(np.ceil(periods / self.tooth_periods)))):
             change = pushed.march(self.per_period) - still.march(self.per_period)
             paths.append(change[:, :2])
-            sizes.append(float(np.linalg.norm(change[:, :4] * scale)) / np.sqrt(change.shape[0]))
+            sizes.append(float(np.linalg.norm(change[:, : 2 * r] * scale)) / np.sqrt(change.shape[0]))
             if not _GONE * push < sizes[-1] < _CHATTER * self.feed:
                 break
         return np.array(sizes), np.concatenate(paths)

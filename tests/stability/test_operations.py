@@ -38,9 +38,9 @@ def counted(monkeypatch):
         found["work"] += answer[2] * layout.damping.shape[0] * modes.pole.size
         return answer
 
-    def march(modes, teeth, slices, plan, memory, number, samples):
-        found["work"] += samples.shape[0] * (modes.pole.size + teeth.shape[0] * len(slices))
-        simulate(modes, teeth, slices, plan, memory, number, samples)
+    def march(modes, pieces, plan, memory, number, samples):
+        found["work"] += samples.shape[0] * (modes.pole.size + len(pieces))
+        simulate(modes, pieces, plan, memory, number, samples)
 
     def asked(self, offset, omega, depth):
         found["work"] += omega.size * (2.0 * offset.size) ** 3

@@ -16,6 +16,7 @@ from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.multiplier_limits import longest_step
 from rcsa_ident.stability.regeneration import regeneration
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
+from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.stability import shaped_mills as mills
 from tests.stability.tilted_ball import tilted_ball
@@ -66,6 +67,18 @@ def test_a_serrated_edge(feed):
     found, _ = limits(mills.rougher(1e-3 * feed), mills.tip(mills.M1[:2]), mills.ROUGHER_SPEEDS, FullDiscretisation(tolerance=1e-3))
     # the limits themselves are told to 0.4 %
     assert found == pytest.approx(mills.ROUGHER[feed], rel=8e-3)
+
+
+@pytest.mark.slow(10)
+@pytest.mark.parametrize(
+    ("name", "place", "near"),
+    [("A", 0, 3e-3), ("A, slope -7", 0, 3e-3), ("C", 0, 3e-3), ("D", 1, 3e-3), ("E A", 2, 7e-3), ("E B", 1, 8e-3)],
+)
+def test_time_domain_without_loss_of_contact(name, place, near):
+    process, tip, rpm, wanted = mills.LIMITS[name]
+    fed = replace(process, feed_per_tooth=1e-4)
+    found, _ = limits(fed, tip, rpm[place : place + 1], TimeDomain(contact_loss=False))
+    assert found == pytest.approx(wanted[place], rel=near)
 
 
 @pytest.mark.slow(10)

@@ -2,66 +2,101 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
 
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
+from rcsa_ident.cutting.rows import places_of
 from rcsa_ident.stability import _time_kernels as kernels
 from rcsa_ident.stability.time_domain import _Cut
+from tests.stability import shaped_mills as mills
 from tests.stability.mills import RPM, SKEWED, mill, tip
 
 SPEED, DEPTH = 9000.0 * RPM, 1.5e-3
 CASES = {
-    "half": mill(2, 0.5, feed_per_tooth=1e-4),
-    "helix, edges, rubbing": mill(3, 0.4, helix=0.6, feed_per_tooth=5e-5, damping=ProcessDamping(3e13, 6e-5), feed_angle=0.5),
-    "run-out": mill(2, 0.5, runout=[0.0, 60e-6], feed_per_tooth=5e-5),
-    "pitch": mill(3, 0.5, pitch=np.radians([100.4, 120.9, 138.7]), feed_per_tooth=5e-5),
-    "a varying speed": mill(2, 0.5, feed_per_tooth=5e-5, speed_variation=SpeedVariation(0.3, 0.5)),
+    "half": (tip(SKEWED), mill(2, 0.5, feed_per_tooth=1e-4)),
+    "helix, edges, rubbing": (
+        tip(SKEWED),
+        mill(3, 0.4, helix=0.6, feed_per_tooth=5e-5, damping=ProcessDamping(3e13, 6e-5), feed_angle=0.5),
+    ),
+    "run-out": (tip(SKEWED), mill(2, 0.5, runout=[0.0, 60e-6], feed_per_tooth=5e-5)),
+    "pitch": (tip(SKEWED), mill(3, 0.5, pitch=np.radians([100.4, 120.9, 138.7]), feed_per_tooth=5e-5)),
+    "a varying speed": (tip(SKEWED), mill(2, 0.5, feed_per_tooth=5e-5, speed_variation=SpeedVariation(0.3, 0.5))),
+    "a ball": (mills.tip(mills.M1), replace(mills.BALL, feed_per_tooth=1e-4, damping=ProcessDamping(3e13, 6e-5))),
+    "a face mill, slopes": (mills.tip(mills.M2, -7.0), replace(mills.FACE, feed_per_tooth=1e-4)),
+    "a helix of each tooth": (mills.tip(mills.M1[:2]), replace(mills.HELIX, feed_per_tooth=1e-4)),
 }
 
 
-def force_of(process, step, here, velocity, path, number, slices, plan, speed):
-    """The force of all teeth, over the share of the step about each tooth's place in which it cuts."""
-    cutter, total = process.cutter, np.zeros(2)
-    for j in range(cutter.teeth):
-        for lag, entry, leave, width in slices:
+def force_of(process, step, here, velocity, path, number, depth, plan, speed):
+    """The force of all teeth, over the share of the step about each tooth's place in which it cuts, in as many directions as `here`."""
+    directions, cutter, known = here.size, process.cutter, process.coefficients
+    total = np.zeros(directions)
+    for z, r, kappa, width, start, end in slices_of(process, depth):
+        # how a rigid cutter's point moves with the tip, (x, y, z) by direction
+        for j in range(cutter.teeth):
+            lag = 2.0 * z * np.tan(cutter.helices[j]) / cutter.diameter
             middle = (step * number + cutter.tooth_angle[j] - lag + 0.5 * step) % (2.0 * np.pi) - 0.5 * step
-            low, high = max(middle - 0.5 * step, entry), min(middle + 0.5 * step, leave)
+            low, high = max(middle - 0.5 * step, start), min(middle + 0.5 * step, end)
             if high <= low:
                 continue
-            normal = np.array([np.sin(0.5 * (low + high)), np.cos(0.5 * (low + high))])
+            s, c = np.sin(0.5 * (low + high)), np.cos(0.5 * (low + high))
+            jacobian = np.array([[1, 0, 0, z, 0], [0, 1, 0, 0, z], [0, 0, 1, -r * s, -r * c]])[:, :directions]
+            out = np.array([np.sin(kappa) * s, np.sin(kappa) * c, -np.cos(kappa)])
+            normal = jacobian.T @ out
             chips, still, back = [], [], 0.0
             for k in range(cutter.teeth):
                 ahead = (j + k + 1) % cutter.teeth
-                back += cutter.pitch[(j + k) % cutter.teeth]
-                moved = process.feed_per_tooth * cutter.teeth * back / (2.0 * np.pi) * normal[0]
+                one, two = (j + k) % cutter.teeth, ahead
+                back += cutter.pitch[one] + 2.0 * z / cutter.diameter * (np.tan(cutter.helices[one]) - np.tan(cutter.helices[two]))
+                moved = process.feed_per_tooth * cutter.teeth * back / (2.0 * np.pi) * s
                 moved += cutter.runout[j] - cutter.runout[ahead]
                 then = np.array([np.interp(number - back / step, *axis) for axis in path])
-                still.append(moved)
-                chips.append(moved + normal @ (here - then))
+                still.append(np.sin(kappa) * moved)
+                chips.append(np.sin(kappa) * moved + normal @ (here - then))
             decides = np.argmin(chips if plan.leaves else still)
             if (chips if plan.leaves else still)[decides] <= 0.0:
                 continue
-            tangential = plan.k_tangential * chips[decides] + plan.edge_tangential
-            radial = plan.k_radial * chips[decides] + plan.edge_radial
+            chip = known.tangential * chips[decides]
+            tangential, radial = chip + known.tangential_edge, known.radial_ratio * chip + known.radial_edge
+            axial = known.axial_ratio * chip + known.axial_edge
             into = normal @ velocity
-            if into > 0.0 or not plan.leaves:
-                rub = plan.rub / (speed * plan.radius) * into
-                tangential, radial = tangential + plan.friction * rub, radial + rub
-            pair = np.array([-tangential * normal[1] - radial * normal[0], tangential * normal[0] - radial * normal[1]])
-            total += (high - low) / step * width * pair
+            if process.damping is not None and (into > 0.0 or not plan.leaves):
+                rub = (
+                    (2.0 if plan.leaves else 1.0) * process.damping.strength / (speed * max(r, 0.1 * cutter.outline.largest_radius)) * into
+                )
+                tangential, radial = tangential + process.damping.friction * rub, radial + rub
+            upward = np.array([-np.cos(kappa) * s, -np.cos(kappa) * c, -np.sin(kappa)])
+            pushes = tangential * np.array([-c, s, 0.0]) - radial * out + axial * upward
+            total += (high - low) / step * width * (jacobian.T @ pushes)
     return total
+
+
+def slices_of(process, depth):
+    """Height, radius, angle of the normal, width and immersion of slices: of a cylinder as many as the code takes, of a shape its nodes."""
+    cutter = process.cutter
+    if process.is_plain:
+        count = max(1, int(np.ceil(12.0 * depth * 2.0 * np.tan(cutter.helix) / cutter.diameter)))
+        z = depth * (np.arange(count) + 0.5) / count
+        return [(each, 0.5 * cutter.diameter, 0.5 * np.pi, depth / count, *process.engagement.angles) for each in z]
+    found = []
+    for piece in places_of(cutter, process.engagement, depth, along=True):
+        for arc in piece.arcs:
+            found += [(*place, *angles) for *place, angles in zip(piece.z, piece.r, piece.kappa, piece.width, arc, strict=True)]
+    return found
 
 
 @pytest.mark.parametrize("leaves", [True, False])
 @pytest.mark.parametrize("name", CASES)
 def test_march(name, leaves):
     """State space, matrix exponentials and forces found until they stand still."""
-    process = CASES[name]
-    cut = _Cut(tip(SKEWED), process, SPEED, leaves)
+    modes, process = CASES[name]
+    cut = _Cut(modes, process, SPEED, leaves)
     run = cut.begin(DEPTH).pushed(2e-5)
-    first, m = run.number, len(SKEWED)
+    first, m, r = run.number, modes.pole.size, cut.directions
     order = np.arange(first - run.memory.past.shape[0], first)
     tips = run.memory.past[order % run.memory.past.shape[0]]
     fast_from = run.memory.state.copy(), run.memory.force.copy()
@@ -75,35 +110,35 @@ def test_march(name, leaves):
     times = cut.time(cut.step * np.arange(first - 1, first + count))
     for i in range(count):
         number, h = first + i, times[i + 1] - times[i]
-        block = np.zeros((2 * m + 4, 2 * m + 4), dtype=complex)
-        block[: 2 * m, : 2 * m], block[: 2 * m, 2 * m : 2 * m + 2] = free, into
-        block[2 * m : 2 * m + 2, 2 * m + 2 :] = np.eye(2) / h
+        block = np.zeros((2 * m + 2 * r, 2 * m + 2 * r), dtype=complex)
+        block[: 2 * m, : 2 * m], block[: 2 * m, 2 * m : 2 * m + r] = free, into
+        block[2 * m : 2 * m + r, 2 * m + r :] = np.eye(r) / h
         step = scipy.linalg.expm(block * h)
         v = process.speed_variation
         speed = SPEED * (1.0 if v is None else 1.0 + v.amplitude * np.sin(v.ratio * SPEED * times[i + 1]))
-        new, path = force, [(order, tips[:, 0]), (order, tips[:, 1])]
+        new, path = force, [(order, tips[:, a]) for a in range(r)]
         for _ in range(12):
-            after = step[: 2 * m, : 2 * m] @ state + step[: 2 * m, 2 * m : 2 * m + 2] @ force
-            after = after + step[: 2 * m, 2 * m + 2 :] @ (new - force)
+            after = step[: 2 * m, : 2 * m] @ state + step[: 2 * m, 2 * m : 2 * m + r] @ force
+            after = after + step[: 2 * m, 2 * m + r :] @ (new - force)
             here, velocity = np.real(out @ after), np.real(out @ (free @ after + into @ new))
-            new = force_of(process, cut.step, here, velocity, path, number, run.slices, run.plan, speed)
+            new = force_of(process, cut.step, here, velocity, path, number, DEPTH, run.plan, speed)
         state, force = after, new
         order, tips = np.append(order, number), np.vstack([tips, here])
-        np.testing.assert_allclose(samples[i, :2], here, rtol=0, atol=1e-4 * np.abs(samples[:, :2]).max())
-        np.testing.assert_allclose(samples[i, 4:], new, rtol=0, atol=4e-4 * np.abs(samples[:, 4:]).max())
+        np.testing.assert_allclose(samples[i, :r], here, rtol=0, atol=1e-4 * np.abs(samples[:, :r]).max())
+        np.testing.assert_allclose(samples[i, 2 * r :], new, rtol=0, atol=4e-4 * np.abs(samples[:, 2 * r :]).max())
     np.testing.assert_allclose(run.memory.state, state[:m], rtol=0, atol=1e-3 * np.abs(state).max())
     np.testing.assert_allclose(
-        samples[:, 2:4], np.gradient(samples[:, :2], times[1:], axis=0), rtol=0, atol=0.1 * np.abs(samples[:, 2:4]).max()
+        samples[:, r : 2 * r], np.gradient(samples[:, :r], times[1:], axis=0), rtol=0, atol=0.1 * np.abs(samples[:, r : 2 * r]).max()
     )
 
 
 def test_a_tooth_in_the_air_pushes_nothing():
-    cut = _Cut(tip(SKEWED), CASES["half"], SPEED, True)
+    cut = _Cut(*CASES["half"], SPEED, True)
     run = cut.begin(DEPTH)
 
     def force(number, here, plan):
         out = np.empty(2)
-        kernels.force_at(number, here, np.zeros(2), 0.0 * run.memory.past, cut.teeth, run.slices, plan, SPEED, out)
+        kernels.force_at(number, here, np.zeros(2), 0.0 * run.memory.past, run.pieces, plan, SPEED, np.empty(2), out)
         return out
 
     np.testing.assert_array_equal(force(int(0.25 * np.pi / cut.step), np.zeros(2), run.plan), 0.0)
@@ -118,7 +153,7 @@ def test_a_tooth_in_the_air_pushes_nothing():
 
 
 def test_clock():
-    plan = _Cut(tip(SKEWED), CASES["half"], 900.0, True).begin(DEPTH).plan._replace(swing=0.7, swings=0.3)
+    plan = _Cut(*CASES["half"], 900.0, True).begin(DEPTH).plan._replace(swing=0.7, swings=0.3)
     for t in (1e-3, 0.02, 0.11):
         swing = 0.3 * 900.0
         angle = 900.0 * (t + 0.7 / swing * (1.0 - np.cos(swing * t)))
