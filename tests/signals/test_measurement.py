@@ -432,7 +432,9 @@ def with_teeth(teeth):
     toolings = dict(campaign.toolings)
     if teeth is not None:
         own = toolings["S1-ER32"]
-        toolings["S1-ER32"] = dataclasses.replace(own, cutter=dataclasses.replace(own.cutter, teeth=teeth, pitch=None, runout=None))
+        toolings["S1-ER32"] = dataclasses.replace(
+            own, cutter=dataclasses.replace(own.cutter, teeth=teeth, pitch=None, runout=None, axial_runout=None)
+        )
     return dataclasses.replace(campaign, toolings=toolings, cuts=tuple(campaign.cuts[k] for k in SOME))
 
 
