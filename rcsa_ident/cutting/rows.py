@@ -16,7 +16,7 @@ from rcsa_ident.cutting._chip_kernels import chip_pieces
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.segments import Line, Segment
-from rcsa_ident.cutting.teeth import Edges, edges_at
+from rcsa_ident.cutting.teeth import Edges, edges_at, lags
 from rcsa_ident.errors import InputError
 
 #: Nodes of a piece of the outline, and one more for each of these angles that its edge lags [rad]; nodes of a wave of a serrated edge.
@@ -192,7 +192,7 @@ def _nodes(cutter: Cutter, segment: Segment, low: float, high: float, least: int
         count = max(4, int(np.ceil(_WAVE * rise / cutter.serration.wavelength)))
         share, weight = (np.arange(count) + 0.5) / count, np.full(count, 1.0 / count)
     else:
-        lag = float(np.max(np.tan(cutter.helices))) * 2.0 * rise / cutter.diameter
+        lag = float(np.max(np.ptp(lags(cutter, z), axis=1)))
         share, weight = _gauss(least + int(np.ceil(lag / _LAG)))
         if corners:
             # arcs begin and end like square roots where the stock's corner meets the outline

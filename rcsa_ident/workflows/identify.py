@@ -289,8 +289,9 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
     known = campaign.coefficients
     edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
+    unlike = [name for name, t in campaign.toolings.items() if t.cutter.repeats == 1]
     turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
-    data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning)
+    data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning, unlike)
     return replace(data, softening_spread=campaign.softening_spread)
 
 
