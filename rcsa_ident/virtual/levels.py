@@ -14,6 +14,8 @@ from rcsa_ident.cutting.conditions import AnyEngagement, Block, CuttingCondition
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.errors import InputError
 
+#: Levels of a wave, at least.
+_OF_A_WAVE = 24
 #: Points by which the lag of an edge of constant angle is integrated.
 _STEPS = 4000
 #: Below this share of the diameter an edge of constant angle does not wind on.
@@ -64,7 +66,7 @@ def levels_of(cutter: Cutter, conditions: CuttingConditions, count: int) -> Leve
     cutter : Cutter
     conditions : CuttingConditions
     count : int
-        Levels; of a shape those near the tip are lower, since it is widest open there.
+        Levels, at least; of a shape those near the tip are lower, since it is widest open there.
 
     Raises
     ------
@@ -72,6 +74,8 @@ def levels_of(cutter: Cutter, conditions: CuttingConditions, count: int) -> Leve
         For a table of arcs, or a depth beyond the edge.
     """
     depth = conditions.axial_depth
+    if cutter.serration is not None:
+        count = max(count, int(np.ceil(_OF_A_WAVE * depth / cutter.serration.wavelength)))
     share = np.arange(count + 1) / count
     ends = depth * (share if cutter.profile is None else share**2)
     middle = 0.5 * (ends[1:] + ends[:-1])

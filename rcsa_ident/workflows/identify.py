@@ -298,9 +298,8 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
 def with_rough(data: IdentificationData, campaign: Campaign, known: KnownToolings | None = None) -> IdentificationData:
     """Return the data whose tool-holders, depths and sensors are known as well as drawings, earlier cuts and campaign say."""
     drawn = [campaign.toolings[name] for name in data.toolings]
-    rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
     # what a sweep does to a line is taken out by the drawn tool-holder's receptances around it
-    if rough is None or data.sweeps:
+    if all(t.spread.exact for t in drawn) or data.sweeps:
         return data
     depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]
     shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
@@ -312,6 +311,10 @@ def with_rough(data: IdentificationData, campaign: Campaign, known: KnownTooling
     )
     data = with_scales(data, campaign.depth_spread / np.array(depths), gain, delay)
     data = with_cross_talk(with_corners(data, *_corners(data, campaign)), talk)
+    rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
+    if rough is None:
+        # a corner radius is no part of a tool-holder
+        return data
     highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
     return with_rough_toolings(data, rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
 

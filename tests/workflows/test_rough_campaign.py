@@ -13,7 +13,7 @@ from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.machining_setup import HALF_NORMAL, Campaign, Cut
 from rcsa_ident.remarks import says
 from rcsa_ident.signals.recording import Quantity, Sensor
-from rcsa_ident.tool_holder.spread import Spread
+from rcsa_ident.tool_holder.spread import SPREAD_FIELDS, Spread
 from rcsa_ident.workflows.identify import of_campaign, with_rough
 from tests.fixtures.virtual_shop import open_shop
 
@@ -80,6 +80,14 @@ def test_tools_of_one_model_have_one_corner_radius_and_exact_ones_none(data, cam
     none = {name: replace(each, spread=replace(each.spread, corner_radius=0.0)) for name, each in campaign.toolings.items()}
     two, one, no = (with_rough(data, replace(campaign, toolings=t)).rough_first for t in (campaign.toolings, alike, none))
     assert (two - one, two - no) == (1, 2)
+
+
+def test_a_corner_radius_alone_may_be_unknown(data, campaign):
+    exact = dict.fromkeys(SPREAD_FIELDS, 0.0)
+    told = {name: replace(each, spread=Spread(**{**exact, "corner_radius": 0.3e-3})) for name, each in campaign.toolings.items()}
+    found = with_rough(data, replace(campaign, toolings=told))
+    assert found.rough is None
+    assert len(found.coefficient_spread) == len(data.coefficient_spread) + 10
 
 
 def test_what_is_told_as_exact_is_no_unknown(data, campaign):
