@@ -40,6 +40,7 @@ STUDIES = (
     "learn",
     "ring",
     "workpiece_side",
+    "corner_radius",
 )
 
 

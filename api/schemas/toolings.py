@@ -99,6 +99,7 @@ class SpreadKeys(Body):
     reclamping_percent: float | None = None
     spindle_joint_percent: float | None = None
     segment_length_mm: float | None = None
+    corner_radius_mm: float | None = None
 
 
 class ToolingKeys(Body):

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
@@ -186,18 +185,17 @@ def _groups(found: Calibrated) -> Sequence[MeanForces]:
     groups: dict[tuple[Any, ...], list[Any]] = {}
     for m in found.used:
         c = m.record.conditions
-        angles = (round(a, 6) for a in (*same_everywhere(c.engagement).angles, c.feed_angle))
-        key = (m.record.clamping, round(c.axial_depth, 9), *angles)
+        key = (m.record.clamping, round(c.axial_depth, 9), str(c.engagement), round(c.feed_angle, 6))
         groups.setdefault(key, []).append(m)
     rows = []
-    for (clamping, depth, entry, exit_, _), members in groups.items():
+    for (clamping, depth, engaged, _), members in groups.items():
         feed = np.array([m.record.conditions.feed_per_tooth for m in members])
         ends = np.array([0.0, 1.05 * feed.max()])
         first = members[0]
         conditions = [replace(first.record.conditions, feed_per_tooth=float(f)) for f in ends]
         line = [found.mean_force_model(replace(first, record=replace(first.record, conditions=c))) for c in conditions]
         count = min(m.mean.size for m in members)
-        title = f"{clamping}, {1e3 * depth:g} mm, {np.degrees(entry):.0f}–{np.degrees(exit_):.0f}°"
+        title = f"{clamping}, {1e3 * depth:g} mm, {engaged}"
         rows.append(MeanForces(title, feed, np.array([m.mean[:count] for m in members]), ends, np.array(line)[:, :count]))
     return rows
 

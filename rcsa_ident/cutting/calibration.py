@@ -9,20 +9,25 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, same_everywhere
+from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import REFERENCE_RUNOUT, unit_lines
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, UNIT_NAMES, unit_lines
 from rcsa_ident.cutting.regression import cluster_covariance, student_quantile
+from rcsa_ident.cutting.segments import Line
 from rcsa_ident.errors import InputError
 
-#: Coefficients in the order of `ForceCalibration.value`; the last two of three belong to a dynamometer that measures along the axis.
-NAMES = ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")
+#: Coefficients in the order of `ForceCalibration.value`; the last two want a dynamometer that measures along the axis, or leaning edges.
+NAMES = UNIT_NAMES
 UNITS = {"K_tc": "N/m^2", "K_rc": "N/m^2", "K_ac": "N/m^2", "K_te": "N/m", "K_re": "N/m", "K_ae": "N/m"}
 #: Fewest cuts from which a scatter between cuts can be told.
 LEAST_CUTS = 3
 _NORMAL_95 = 1.959964
 #: Condition number of the scaled regression from which on coefficients cannot be told apart.
 _WORST_CONDITION = 1e5
+#: The same for what X and Y tell of the axial coefficients of a leaning edge: one depth tells nothing, two depths or more may.
+_WORST_LEANING = 100.0
+#: Note where an edge leans and X and Y alone, at too few depths, tell radial and axial coefficients together.
+TOGETHER = "the edge leans, and X and Y at these depths cannot tell radial and axial coefficients apart: K_rc and K_re stand for both there"
 _OTHER_AXES = "sign or axes of the sensors may be others than told: they can be tried all"
 
 
@@ -101,15 +106,20 @@ class ForceCalibration:
 def mean_force_matrix(cutter: Cutter, conditions: CuttingConditions) -> FloatArray:
     """Return the mean force of a cut per unit of each coefficient of `NAMES`, in machine axes X, Y and axial, shape (3, 6).
 
-    It is linear in the feed: mean F = N a / (2 pi) (feed K_c int sin phi ... + K_e int ...), and neither helix nor run-out
-    change it as long as every tooth cuts.
+    It is linear in the feed: mean F = N a / (2 pi) (feed K_c int sin phi ... + K_e int ...) of a wall, and neither helix nor run-out
+    change it as long as every tooth cuts. Axial is from the spindle towards the tip, -z.
     """
-    matrix = np.zeros((3, 6))
-    matrix[:2, :4] = unit_lines(cutter, conditions, np.array([0]))[0].real
-    entry, exit_ = same_everywhere(conditions.engagement).angles
-    share = cutter.teeth * conditions.axial_depth / (2.0 * np.pi)
-    matrix[2, 4:] = share * conditions.feed_per_tooth * (np.cos(entry) - np.cos(exit_)), share * (exit_ - entry)
-    return matrix
+    matrix = unit_lines(cutter, conditions, np.array([0]), axial=True)[0].real
+    return np.array([1.0, 1.0, -1.0])[:, None] * matrix
+
+
+def leaning(cutter: Cutter, conditions: CuttingConditions) -> bool:
+    """Whether the axial coefficients push in X and Y, too: somewhere in the cut the edge's envelope is no wall."""
+    upright = [
+        isinstance(segment, Line) and abs(segment.kappa - 0.5 * np.pi) < 1e-9
+        for segment, _, _ in cutter.outline.pieces(conditions.axial_depth)
+    ]
+    return not all(upright)
 
 
 def calibrate_mean_force(
@@ -141,11 +151,16 @@ def calibrate_mean_force(
     if len(cuts) < LEAST_CUTS:
         raise InputError("cuts", len(cuts), f"at least {LEAST_CUTS}, so that their scatter can be estimated")
     count = force.shape[1]
-    names = NAMES if count == 3 else NAMES[:4]
-    design = np.concatenate([mean_force_matrix(*cut)[:count, : len(names)] for cut in cuts])
+    design = np.concatenate([mean_force_matrix(*cut)[:count] for cut in cuts])
+    notes: list[str] = []
+    names: tuple[str, ...] = NAMES
+    if count == 2:
+        leans, size = any(leaning(*cut) for cut in cuts), np.linalg.norm(design, axis=0)
+        if not (leans and np.all(size > 0.0) and np.linalg.cond(design / size) <= _WORST_LEANING):
+            names, design = NAMES[:4], design[:, :4]
+            notes += [TOGETHER] if leans else []
     observed, cluster = force.reshape(-1), np.repeat(np.arange(len(cuts)), count)
     kept = list(range(len(names)))
-    notes: list[str] = []
     while True:
         scale = np.linalg.norm(design[:, kept], axis=0)
         if not np.all(scale > 0.0) or np.linalg.cond(design[:, kept] / scale) > _WORST_CONDITION:
@@ -176,10 +191,8 @@ def calibrate_mean_force(
 
 def _runout_effect(cutter: Cutter, conditions: CuttingConditions, solution: FloatArray, kept: Sequence[int], runout: float) -> FloatArray:
     """Change of a cut's mean force by an eccentricity, shape (3,) [N]; the axial one is not followed."""
-    known = np.zeros(4)
-    for k, value in zip(kept, solution, strict=True):
-        if k < 4:
-            known[k] = value
+    known = np.zeros(len(NAMES))
+    known[list(kept)] = solution
     # no tooth stands where the eccentricity is 0 or largest
     eccentric = replace(cutter, runout=runout * np.cos(cutter.tooth_angle - 0.125 * cutter.pitch[0]))
     order = np.array([0])

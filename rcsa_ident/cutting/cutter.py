@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -129,7 +129,19 @@ class Cutter(Shown):
     @property
     def is_cylinder(self) -> bool:
         """True where everything along the edges is constant but their lag, which all teeth have in common: closed forms are for it."""
-        return self.profile is None and self.serration is None and self.tilt == 0.0 and np.ndim(self.helix) == 0
+        return self.profile is None and self.serration is None and self.tilt == 0.0 and not isinstance(self.helix, np.ndarray)
+
+    def running_true(self) -> Cutter:
+        """Return the same without any run-out or tilt; waves stay."""
+        if self.tilt == 0.0 and not self.runout.any() and not self.axial_runout.any():
+            return self
+        none = np.zeros(self.teeth)
+        return replace(self, runout=none, axial_runout=none, tilt=0.0)
+
+    @property
+    def repeats(self) -> int:
+        """How often a turn its force repeats itself where it runs true: once a tooth where teeth are alike, else once."""
+        return self.teeth if self.running_true().equally_spaced else 1
 
     @property
     def offset(self) -> bool:
@@ -155,15 +167,11 @@ class Cutter(Shown):
     @property
     def equally_spaced(self) -> bool:
         """True where all teeth are alike, so that only multiples of the tooth-passing frequency are excited."""
-        waves = self.serration is not None and np.ptp(np.mod(self.serration.shifts(self.teeth), 1.0)) > 0.0
-        return bool(
-            np.ptp(self.pitch) < 1e-9
-            and np.ptp(self.runout) == 0.0
-            and np.ptp(self.axial_runout) == 0.0
-            and np.ndim(self.helix) == 0
-            and self.tilt == 0.0
-            and not waves
-        )
+        if self.tilt != 0.0 or isinstance(self.helix, np.ndarray) or self.pitch.max() - self.pitch.min() >= 1e-9:
+            return False
+        if any(offset.max() > offset.min() for offset in (self.runout, self.axial_runout)):
+            return False
+        return self.serration is None or bool(np.ptp(np.mod(self.serration.shifts(self.teeth), 1.0)) == 0.0)
 
     def cylinder_remarks(self, depth: float | None = None, forces: bool = False) -> tuple[Remark, ...]:
         """Return what to make of an answer that took the cutter for a cylinder; nothing where it is one.

@@ -111,6 +111,8 @@ def deflected_edge(process: MillingProcess, deflection: ToolDeflection, speed: f
     InputError
         If the cut generates no wall, or is deeper than the tool is long.
     """
+    if not process.cutter.is_cylinder:
+        raise InputError("cutter", str(process.cutter), "a cylinder with one helix: of other shapes no deflection is computed")
     radius = 0.5 * process.cutter.diameter
     entry, leave = same_everywhere(process.engagement).angles
     down = bool(abs(leave - np.pi) < 1e-9)

@@ -1,17 +1,19 @@
-"""Milling force in a stable cut: Fourier lines and time histories ([inprocess], eqs. 2-4, with edges and helix)."""
+"""Milling force in a stable cut: Fourier lines and time histories ([inprocess], eqs. 2-4, with edges, helix and the cutter's shape)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from itertools import pairwise
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting._chip_kernels import chip_pieces
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, same_everywhere
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.rows import Rows, rows_of
+from rcsa_ident.cutting.teeth import edges_at
 
 
 class ForceTerm(StrEnum):
@@ -28,6 +30,8 @@ class ForceTerm(StrEnum):
 SLOPES = tuple(ForceTerm)
 #: A cutter's usual eccentricity in its clamping [m].
 REFERENCE_RUNOUT = 2e-6
+#: In what forces are linear, in the order of `unit_lines`; the last two reach X and Y where the edge leans.
+UNIT_NAMES = ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,38 +52,69 @@ class ForceCoefficient:
         return f"{self.term} of {self.tooling}" if self.tooling else str(self.term)
 
 
-def tooth_force(phi: FloatArray, chip: FloatArray, coefficients: CuttingCoefficients) -> FloatArray:
-    """Return the force of one cutting tooth on the tool per unit axial depth, (feed, normal, axial).
+def _turning_directions() -> ComplexArray:
+    """What `_unit_lines` sums up, from the moments of rows, shape (5, 3, 3, 3, 6).
+
+    For each e^{i q phi}, q = -2..2, chip made of run-out, chip of sin phi or edge, and direction on an upright edge, by sin kappa and by
+    cos kappa: (x, y, z) per unit of each coefficient.
+    """
+    one, cos, sin = (np.array(values, dtype=complex) for values in ((0, 0, 1, 0, 0), (0, 0.5, 0, 0.5, 0), (0, 0.5j, 0, -0.5j, 0)))
+    none = np.zeros(5)
+    along, inward, upward = (np.stack(parts, axis=1) for parts in ([-cos, sin, none], [-sin, -cos, none], [none, none, one]))
+    found = np.zeros((5, 3, 3, 3, 6), dtype=complex)
+    for kind, (tangential, radial, axial) in enumerate(((0, 1, 4), (0, 1, 4), (2, 3, 5))):
+        found[:, kind, 0, :, tangential] = along
+        found[:, kind, 1, :, radial], found[:, kind, 2, :, radial] = inward, upward
+        found[:, kind, 2, :, axial], found[:, kind, 1, :, axial] = inward, -upward
+    # times sin phi
+    found[:, 1] = np.apply_along_axis(lambda waves: np.convolve(waves, sin)[2:-2], 0, found[:, 1])
+    return found
+
+
+#: For the force in x and y, and in z beside them.
+_DIRECTIONS = {n: _turning_directions()[..., :n, :].reshape(45, 6 * n) for n in (2, 3)}
+_Q = np.arange(-2.0, 3.0)
+
+
+def tooth_force(
+    phi: FloatArray, chip: FloatArray, coefficients: CuttingCoefficients, kappa: float | FloatArray = 0.5 * np.pi
+) -> FloatArray:
+    """Return the force of one cutting tooth on the tool per width of edge, (feed, normal, axial).
 
     Parameters
     ----------
     phi : array, shape (n,) [rad]
         Immersion, clockwise from the normal direction.
     chip : array, shape (n,) [m]
-        Chip thickness; the tooth is taken to be in the material.
+        Chip thickness, across the edge; the tooth is taken to be in the material.
     coefficients : CuttingCoefficients
+    kappa : float or array, shape (n,) [rad], default a wall
+        Angle of the edge's outward normal, from the axis pointing down.
 
     Returns
     -------
     array, shape (n, 3) [N/m]
+        The third one from the spindle towards the tip, -z.
     """
-    s, c = np.sin(phi), np.cos(phi)
+    s, c, sine, cosine = np.sin(phi), np.cos(phi), np.sin(kappa), np.cos(kappa)
     tangential = coefficients.tangential * chip + coefficients.tangential_edge
     radial = coefficients.tangential * coefficients.radial_ratio * chip + coefficients.radial_edge
     axial = coefficients.tangential * coefficients.axial_ratio * chip + coefficients.axial_edge
-    return np.stack([-c * tangential - s * radial, s * tangential - c * radial, axial], axis=-1)
+    inward = radial * sine + axial * cosine
+    return np.stack([-c * tangential - s * inward, s * tangential - c * inward, axial * sine - radial * cosine], axis=-1)
 
 
 def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray) -> ComplexArray:
     """Return the amplitudes of the milling force at multiples of the spindle frequency.
 
     The force is F(t) = Re sum_m lines[m] e^{i m Omega t} with tooth 1 (at the tip) at immersion 0 when t = 0. Exact
-    for any pitch and helix as long as each tooth cuts through the whole immersion; with run-out the chip thickness of
-    a tooth may end early and `runout_force_lines` applies.
+    for any shape, pitch and helix of a cutter that runs true; with run-out the chip of a tooth may begin late or end early
+    and `runout_force_lines` applies.
 
     Parameters
     ----------
     cutter : Cutter
+        Its run-out is left aside.
     conditions : CuttingConditions
     coefficients : CuttingCoefficients
     orders : array of int, shape (m,)
@@ -91,144 +126,17 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     complex array, shape (m, 2) [N]
         Amplitudes in machine axes X, Y.
 
+    Raises
+    ------
+    InputError
+        If nothing cuts, or the depth is beyond the edge.
+
     Notes
     -----
-    A tooth's force per depth is a sum of e^{i q phi}, q = -2..2, in its engagement, so each line is a sum of
-    integrals of e^{i (q - m) phi}; a helix multiplies line m by the mean of e^{-i m 2 z tan(helix) / D} over the depth.
+    A row of edge pushes with a sum of e^{i q phi}, q = -2..2, along its arc, so each line is a sum of integrals of
+    e^{i (q - m) phi}; a wall's helix multiplies line m by the mean of e^{-i m 2 z tan(helix) / D} over the depth.
     """
-    orders = np.asarray(orders)
-    chip, _, edge = _forms(coefficients)
-    return _over_depth(_per_depth(cutter, conditions, orders, chip, edge), cutter, conditions, orders)
-
-
-def _per_depth(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, chip: ComplexArray, edge: ComplexArray) -> ComplexArray:
-    """Lines of forces per depth whose forms are columns, shape (m, n)."""
-    entry, exit_ = same_everywhere(conditions.engagement).angles
-    # teeth: sum_j e^{i m psi_j}, weighted by the feed that tooth j takes (its pitch)
-    phases = np.exp(1j * np.outer(orders, cutter.tooth_angle))
-    feed = conditions.feed_per_tooth * cutter.pitch * cutter.teeth / (2.0 * np.pi)
-    q = np.arange(-2, 3)
-    window = _exponential_integral(q[None, :] - orders[:, None], entry, exit_) / (2.0 * np.pi)
-    return (phases @ feed)[:, None] * (window @ chip) + phases.sum(axis=1)[:, None] * (window @ edge)
-
-
-def force_and_slope(
-    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return the lines of `force_lines`, and how their logarithms change with what is never known exactly.
-
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
-    orders : array of int, shape (m,)
-        Multiples of the spindle frequency.
-
-    Returns
-    -------
-    complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]
-        The last axis is `SLOPES`: logarithms of K_tc, k_rc, K_te and K_re, and a run-out in units of `REFERENCE_RUNOUT`, whose
-        effect on the lines that all teeth share is a secant: teeth leave the material early. 0 where there is no force.
-    """
-
-    def lines(**changed: float) -> ComplexArray:
-        return force_lines(cutter, conditions, replace(coefficients, **changed), orders)
-
-    total = lines()
-    smooth = lines(tangential_edge=0.0, radial_edge=0.0)
-    tangential = lines(tangential_edge=0.0, radial_edge=0.0, radial_ratio=0.0)
-    edges = [lines(radial_edge=0.0) - smooth, lines(tangential_edge=0.0) - smooth]
-    # no tooth stands where the eccentricity is 0 or largest
-    eccentric = replace(cutter, runout=REFERENCE_RUNOUT * np.cos(cutter.tooth_angle - 0.125 * cutter.pitch[0]))
-    runout = runout_force_lines(eccentric, conditions, coefficients, orders) - total
-    change = np.stack([smooth, smooth - tangential, *edges, runout], axis=-1)
-    return total, np.divide(change, total[..., None], out=np.zeros_like(change), where=total[..., None] != 0.0)
-
-
-def _over_depth(lines: ComplexArray, cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray) -> ComplexArray:
-    """Integrate two-sided lines per depth over the depth, turn them to machine axes and make them one-sided."""
-    lag = orders * np.tan(cutter.helix) / cutter.diameter * conditions.axial_depth
-    lines = lines * (conditions.axial_depth * np.exp(-1j * lag) * np.sinc(lag / np.pi))[:, None]
-    lines = np.where(orders[:, None] == 0, 1.0, 2.0) * lines
-    return lines @ conditions.machine_from_feed.T
-
-
-def _forms(coefficients: CuttingCoefficients) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Coefficients of e^{i q phi}, q = -2..2, of the (feed, normal) force per depth: per unit feed, per unit of chip, of the edge."""
-    k, kr = coefficients.tangential, coefficients.tangential * coefficients.radial_ratio
-    return _sine_form(k, kr), _constant_form(k, kr), _constant_form(coefficients.tangential_edge, coefficients.radial_edge)
-
-
-def _sine_form(tangential: float, radial: float) -> ComplexArray:
-    """Return the form of forces along the edge that are as sin phi, shape (5, 2)."""
-    # rows q = -2..2 of sin cos, sin^2
-    sin_cos = np.array([0.25j, 0, 0, 0, -0.25j])
-    sin_sin = np.array([-0.25, 0, 0.5, 0, -0.25])
-    return np.stack([-tangential * sin_cos - radial * sin_sin, tangential * sin_sin - radial * sin_cos], axis=1)
-
-
-def _constant_form(tangential: float, radial: float) -> ComplexArray:
-    """Return the form of forces along the edge that do not depend on phi, shape (5, 2)."""
-    cos = np.array([0, 0.5, 0, 0.5, 0])
-    sin = np.array([0, 0.5j, 0, -0.5j, 0])
-    return np.stack([-tangential * cos - radial * sin, tangential * sin - radial * cos], axis=1)
-
-
-def _exponential_integral(n: np.ndarray, start: float, end: float) -> ComplexArray:
-    """Integral of e^{i n phi} from start to end for whole n."""
-    half = 0.5 * (end - start)
-    return 2.0 * half * np.exp(0.5j * n * (start + end)) * np.sinc(n * half / np.pi)
-
-
-def force_history(
-    cutter: Cutter,
-    conditions: CuttingConditions,
-    coefficients: CuttingCoefficients,
-    angle: FloatArray,
-    slices: int = 32,
-) -> FloatArray:
-    """Return the force over the rotation angle of tooth 1, in machine axes, with run-out and teeth that miss.
-
-    The chip of a tooth is what the teeth before it left, over up to one revolution of them; a tooth whose path lies
-    inside their surface cuts nothing.
-
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
-    angle : array, shape (n,) [rad]
-        Immersion of tooth 1 at the tip.
-    slices : int
-        Axial slices of the depth, for the helix.
-
-    Returns
-    -------
-    array, shape (n, 3) [N]
-        Force along X, Y and the spindle's axis.
-    """
-    angle = np.asarray(angle, dtype=float)
-    total = np.zeros((angle.size, 3))
-    height = (np.arange(slices) + 0.5) / slices * conditions.axial_depth
-    lag = 2.0 * height * np.tan(cutter.helix) / cutter.diameter
-    feed = conditions.feed_per_tooth * cutter.teeth * cutter.pitch / (2.0 * np.pi)
-    entry, exit_ = same_everywhere(conditions.engagement).angles
-    for j in range(cutter.teeth):
-        for each in lag:
-            phi = np.mod(angle + cutter.tooth_angle[j] - each, 2.0 * np.pi)
-            chip = _kinematic_chip(j, np.sin(phi), feed, cutter.runout)
-            cuts = (phi >= entry) & (phi < exit_) & (chip > 0.0)
-            force = tooth_force(phi, chip, coefficients)
-            total += np.where(cuts[:, None], force, 0.0) * conditions.axial_depth / slices
-    total[:, :2] = total[:, :2] @ conditions.machine_from_feed.T
-    return total
-
-
-def _kinematic_chip(j: int, sine: FloatArray, feed: FloatArray, runout: FloatArray) -> FloatArray:
-    """Chip of tooth j: the smallest distance to the surfaces left by the teeth ahead, over one revolution of them."""
-    moved, offset = _chip_bounds(j, feed, runout)
-    return np.min(moved * sine[..., None] + offset, axis=-1)
+    return unit_lines(cutter, conditions, orders) @ _values(coefficients)
 
 
 def runout_force_lines(
@@ -253,12 +161,13 @@ def runout_force_lines(
     A tooth's chip is the smallest of as many a sin(phi) + b as there are teeth, where positive: between the angles at
     which two of them, or one and zero, meet, each line is the integral that `force_lines` takes.
     """
-    orders = np.asarray(orders)
-    return _over_depth(_runout_per_depth(cutter, conditions, orders, *_forms(coefficients)), cutter, conditions, orders)
+    return unit_lines(cutter, conditions, orders, runout=True) @ _values(coefficients)
 
 
-def unit_lines(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, runout: bool = False) -> ComplexArray:
-    """Return the lines per unit K_tc, K_rc, K_te and K_re: the force is linear in them.
+def unit_lines(
+    cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, runout: bool = False, axial: bool = False
+) -> ComplexArray:
+    """Return the lines per unit of K_tc, K_rc, K_te, K_re, K_ac and K_ae: the force is linear in them.
 
     Parameters
     ----------
@@ -268,40 +177,142 @@ def unit_lines(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray
         Multiples of the spindle frequency.
     runout : bool
         Whether teeth may cut deeper, late or not at all, as with `runout_force_lines`.
+    axial : bool
+        Whether the force along z, from the tip to the spindle, is told, too.
 
     Returns
     -------
-    complex array, shape (m, 2, 4) [m^2, m^2, m, m]
+    complex array, shape (m, 2 or 3, 6) [m^2, m^2, m, m, m^2, m]
+        In machine axes. Where the edge stands upright the last two columns have no part in X and Y; where it leans they go with those of
+        K_rc and K_re, and one depth in X and Y tells their sum alone.
+
+    Raises
+    ------
+    InputError
+        As in `force_lines`.
     """
     orders = np.asarray(orders)
-    # (5, 2) of each coefficient side by side
-    none = np.zeros((5, 4), dtype=complex)
-    shear, edges = (np.hstack([form(1.0, 0.0), form(0.0, 1.0)]) for form in (_sine_form, _constant_form))
-    chip, offset, edge = np.hstack([shear, none]), np.hstack([edges, none]), np.hstack([none, edges])
-    if runout:
-        lines = _runout_per_depth(cutter, conditions, orders, chip, offset, edge)
-    else:
-        lines = _per_depth(cutter, conditions, orders, chip, edge)
-    columns = [_over_depth(lines[:, k : k + 2], cutter, conditions, orders) for k in range(0, 8, 2)]
-    return np.stack(columns, axis=-1)
-
-
-def _runout_per_depth(
-    cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, per_feed: ComplexArray, per_depth: ComplexArray, edge: ComplexArray
-) -> ComplexArray:
-    """Lines of forces per depth whose forms are columns, piece by piece of each tooth's chip, shape (m, n)."""
-    feed = conditions.feed_per_tooth * cutter.pitch * cutter.teeth / (2.0 * np.pi)
-    q = np.arange(-2, 3)
-    lines = np.zeros((orders.size, edge.shape[1]), dtype=complex)
-    for j in range(cutter.teeth):
-        moved, offset = _chip_bounds(j, feed, cutter.runout)
-        tooth = np.zeros_like(lines)
-        for start, end, k in _chip_pieces(moved, offset, same_everywhere(conditions.engagement)):
-            a, b = moved[k], offset[k]
-            window = _exponential_integral(q[None, :] - orders[:, None], start, end) / (2.0 * np.pi)
-            tooth += window @ (a * per_feed + b * per_depth + edge)
-        lines += np.exp(1j * orders * cutter.tooth_angle[j])[:, None] * tooth
+    components = 3 if axial else 2
+    if conditions.axial_depth == 0.0:
+        return np.zeros((orders.size, components, 6), dtype=complex)
+    cutter = cutter if runout else cutter.running_true()
+    lines = _unit_lines(rows_of(cutter, conditions.engagement, conditions.axial_depth, conditions.feed_per_tooth), orders, components)
+    if conditions.feed_angle:
+        lines[:, :2] = conditions.machine_from_feed @ lines[:, :2]
     return lines
+
+
+def _unit_lines(rows: Rows, orders: np.ndarray, components: int) -> ComplexArray:
+    """One-sided lines of all rows together per unit of each coefficient, in (feed, normal, z), shape (m, components, 6)."""
+    sine, cosine = np.sin(rows.kappa), np.cos(rows.kappa)
+    half = 0.5 * (rows.end - rows.start)
+    # the integral over a row's arc, turned to where its tooth stands, times the mean over the lags along a wall
+    n = _Q - orders[:, None, None]
+    turned = rows.angle - 0.5 * (rows.near + rows.far)
+    window = np.exp(1j * (n * (0.5 * (rows.start + rows.end))[:, None] + (orders[:, None] * turned)[:, :, None]))
+    window *= np.sinc(n * (half / np.pi)[:, None])
+    wall = np.sinc(orders[:, None] * ((0.5 / np.pi) * (rows.far - rows.near))) * (rows.width * half)
+    window *= wall[:, :, None]
+    ones = np.ones_like(sine)
+    chip = np.array([sine * rows.step, sine * rows.feed, ones])[:, None] * np.array([ones, sine, cosine])
+    moments = window.swapaxes(1, 2) @ chip.reshape(9, -1).T
+    lines = (moments.reshape(orders.size, 45) @ _DIRECTIONS[components]).reshape(orders.size, components, 6)
+    # teeth that are alike answer each other at other orders than their multiples
+    copies = round(2.0 * np.pi / rows.spacing)
+    lines *= (np.where(orders == 0, 1.0, 2.0) * (orders % copies == 0) * (copies / np.pi))[:, None, None]
+    return lines
+
+
+def _values(coefficients: CuttingCoefficients) -> FloatArray:
+    """Coefficients in the order of `UNIT_NAMES`."""
+    c = coefficients
+    return np.array(
+        [c.tangential, c.tangential * c.radial_ratio, c.tangential_edge, c.radial_edge, c.tangential * c.axial_ratio, c.axial_edge]
+    )
+
+
+def force_and_slope(
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the lines of `force_lines`, and how their logarithms change with what is never known exactly.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
+    orders : array of int, shape (m,)
+        Multiples of the spindle frequency.
+
+    Returns
+    -------
+    complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]
+        The last axis is `SLOPES`: logarithms of K_tc, k_rc, K_te and K_re, and a run-out in units of `REFERENCE_RUNOUT`, whose
+        effect on the lines that all teeth share is a secant: teeth leave the material early. 0 where there is no force.
+    """
+    values = _values(coefficients)
+    parts = unit_lines(cutter, conditions, orders) * values
+    total = parts.sum(axis=2)
+    # no tooth stands where the eccentricity is 0 or largest
+    eccentric = replace(cutter, runout=REFERENCE_RUNOUT * np.cos(cutter.tooth_angle - 0.125 * cutter.pitch[0]))
+    runout = unit_lines(eccentric, conditions, orders, runout=True) @ values - total
+    change = np.stack([parts[..., 0] + parts[..., 1] + parts[..., 4], parts[..., 1], parts[..., 2], parts[..., 3], runout], axis=-1)
+    return total, np.divide(change, total[..., None], out=np.zeros_like(change), where=total[..., None] != 0.0)
+
+
+def force_history(
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+    angle: FloatArray,
+    slices: int = 32,
+) -> FloatArray:
+    """Return the force over the rotation angle of tooth 1, in machine axes, with run-out and teeth that miss.
+
+    The chip of a tooth is what the teeth before it left, over up to one revolution of them; a tooth whose path lies
+    inside their surface cuts nothing.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
+    angle : array, shape (n,) [rad]
+        Immersion of tooth 1 at the tip.
+    slices : int
+        Parts of the edge, at least.
+
+    Returns
+    -------
+    array, shape (n, 3) [N]
+        Force along X, Y and from the spindle towards the tip, -z.
+    """
+    angle = np.asarray(angle, dtype=float)
+    total = np.zeros((angle.size, 3))
+    depth, engagement = conditions.axial_depth, conditions.engagement
+    feed = conditions.feed_per_tooth * cutter.teeth / (2.0 * np.pi)
+    for segment, low, high in cutter.outline.pieces(depth, engagement.radii, engagement.heights):
+        _, ends, _ = segment.at(np.array([low, high]))
+        count = int(np.ceil(slices * np.ptp(ends) / depth - 1e-9))
+        r, z, kappa = segment.at(low + (high - low) * (np.arange(count) + 0.5) / count)
+        edges, arcs = edges_at(cutter, z, kappa), engagement.arcs(r, z)
+        # a wave leans the edge and lengthens it
+        leaning = np.arctan2(np.sin(kappa), np.cos(kappa) + edges.slope * np.sin(kappa))
+        width = segment.length * (high - low) / count * np.sin(kappa) / np.sin(leaning)
+        for j, k in np.ndindex(cutter.teeth, count):
+            phi = np.mod(angle + cutter.tooth_angle[j] - edges.lag[j, k], 2.0 * np.pi)
+            chip = _kinematic_chip(j, np.sin(phi), feed * edges.pitch[:, k], edges.offset[:, k])
+            inside = np.any((phi >= arcs[:, k, :1]) & (phi < arcs[:, k, 1:]), axis=0)
+            force = tooth_force(phi, chip * np.sin(leaning[j, k]), coefficients, leaning[j, k])
+            total += np.where((inside & (chip > 0.0))[:, None], force, 0.0) * width[j, k]
+    total[:, :2] = total[:, :2] @ conditions.machine_from_feed.T
+    return total
+
+
+def _kinematic_chip(j: int, sine: FloatArray, feed: FloatArray, runout: FloatArray) -> FloatArray:
+    """Chip of tooth j: the smallest distance to the surfaces left by the teeth ahead, over one revolution of them."""
+    moved, offset = _chip_bounds(j, feed, runout)
+    return np.min(moved * sine[..., None] + offset, axis=-1)
 
 
 def _chip_bounds(j: int, feed: FloatArray, runout: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -322,27 +333,7 @@ def regenerations(cutter: Cutter, feed_per_tooth: float, engagement: Engagement)
     engagement : Engagement
     """
     feed = feed_per_tooth * cutter.teeth * cutter.pitch / (2.0 * np.pi)
-    found = []
-    for j in range(cutter.teeth):
-        moved, offset = _chip_bounds(j, feed, cutter.runout)
-        found += [(j, start, end, k + 1) for start, end, k in _chip_pieces(moved, offset, engagement)]
-    return found
-
-
-def _chip_pieces(moved: FloatArray, offset: FloatArray, engagement: Engagement) -> list[tuple[float, float, int]]:
-    """Angles between which the chip is one a sin(phi) + b, with its place; only where it is positive."""
-    entry, exit_ = engagement.entry, engagement.exit
-    meet = [-b / a for a, b in zip(moved, offset, strict=True) if a > 0.0]
-    for i in range(moved.size):
-        steeper = moved[:i] != moved[i]
-        meet += ((offset[:i] - offset[i])[steeper] / (moved[i] - moved[:i])[steeper]).tolist()
-    angles = np.arcsin([s for s in meet if 0.0 < s < 1.0])
-    angles = np.concatenate([[entry, exit_], angles, np.pi - angles])
-    angles = np.unique(angles[(angles >= entry) & (angles <= exit_)])
-    pieces = []
-    for start, end in pairwise(angles.tolist()):
-        chips = moved * np.sin(0.5 * (start + end)) + offset
-        k = int(np.argmin(chips))
-        if chips[k] > 0.0:
-            pieces.append((start, end, k))
-    return pieces
+    moved, step = np.stack([_chip_bounds(j, feed, cutter.runout) for j in range(cutter.teeth)], axis=2)
+    start, end = np.full(cutter.teeth, engagement.entry), np.full(cutter.teeth, engagement.exit)
+    pieces = chip_pieces(moved, step, start, end, np.ones(cutter.teeth, dtype=bool))
+    return [(int(j), float(start), float(end), int(k) + 1) for j, k, start, end in zip(*pieces, strict=True)]

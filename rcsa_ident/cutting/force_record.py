@@ -79,11 +79,11 @@ class ForceRecord:
         Parameters
         ----------
         coefficients : array, shape (4,) [N/m^2 or N/m]
-            K_tc, K_rc, K_te, K_re.
+            K_tc, K_rc, K_te, K_re; of a leaning edge the radial ones stand for the axial ones as well.
         """
         orders = self.own_orders[1:]
         orders = orders[orders <= HARMONICS * self.cutter.teeth]
-        model = unit_lines(self.cutter, self.conditions, orders) @ coefficients
+        model = unit_lines(self.cutter, self.conditions, orders)[:, :, :4] @ coefficients
         target = self.lines[orders, :2]
         reach = 2.0 * np.pi / (self.cutter.teeth if self.cutter.equally_spaced else 1)
         angles = np.linspace(0.0, reach, ANGLES * (1 if self.cutter.equally_spaced else self.cutter.teeth), endpoint=False)

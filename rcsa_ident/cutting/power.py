@@ -8,8 +8,9 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, same_everywhere
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Shown
 from rcsa_ident.units import to_rpm
@@ -39,22 +40,36 @@ def radial_depth(cutter: Cutter, engagement: Engagement) -> float:
 def spindle_load(cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients) -> SpindleLoad:
     """Return what a cut takes from the spindle; the power that feeds the table is left out, it is a few thousandths.
 
-    T = a D / (4 pi) (K_tc N c (cos phi_entry - cos phi_exit) + K_te N (phi_exit - phi_entry)) with the feed per tooth c;
-    power T Omega, of which the chips take K_tc times the removal rate a a_e N c Omega / (2 pi). Pitch, helix and, for the
-    chips' part, run-out change none of it.
+    T = (K_tc V + K_te W) / (2 pi) with the chip volume V and the area W over which edges rub, both in a turn; power T Omega, of which
+    the chips take K_tc times the removal rate V Omega / (2 pi). V is the feed per turn times the area that it sweeps, whatever the
+    shape; of a wall V = N c a a_e with the feed per tooth c, and W = N a (phi_exit - phi_entry) D / 2. Pitch, helix and, for the chips'
+    part, run-out change none of it.
 
     Parameters
     ----------
     cutter : Cutter
+        Its run-out is left aside.
     conditions : CuttingConditions
     coefficients : CuttingCoefficients
     """
-    engagement, teeth = same_everywhere(conditions.engagement), cutter.teeth
-    chips = coefficients.tangential * conditions.feed_per_tooth * (np.cos(engagement.entry) - np.cos(engagement.exit))
-    edges = coefficients.tangential_edge * (engagement.exit - engagement.entry)
-    torque = conditions.axial_depth * cutter.diameter * teeth / (4.0 * np.pi) * float(chips + edges)
-    per_second = teeth * conditions.feed_per_tooth * conditions.spindle_speed / (2.0 * np.pi)
-    return SpindleLoad(torque, torque * conditions.spindle_speed, conditions.axial_depth * radial_depth(cutter, engagement) * per_second)
+    volume, rubbed = _in_a_turn(cutter, conditions)
+    torque = (coefficients.tangential * volume + coefficients.tangential_edge * rubbed) / (2.0 * np.pi)
+    return SpindleLoad(torque, torque * conditions.spindle_speed, volume * conditions.spindle_speed / (2.0 * np.pi))
+
+
+def _in_a_turn(cutter: Cutter, conditions: CuttingConditions) -> tuple[float, float]:
+    """Chip volume [m^3], and the area over which edges rub [m^2]."""
+    engagement, feed, depth = conditions.engagement, conditions.feed_per_tooth, conditions.axial_depth
+    if cutter.is_cylinder and isinstance(engagement, Engagement):
+        rubbed = 0.5 * cutter.diameter * (engagement.exit - engagement.entry)
+        return cutter.teeth * depth * feed * radial_depth(cutter, engagement), cutter.teeth * depth * rubbed
+    if depth == 0.0:
+        return 0.0, 0.0
+    rows = rows_of(cutter.running_true(), engagement, depth, feed)
+    swept = rows.end - rows.start
+    chip = np.sin(rows.kappa) * (rows.feed * (np.cos(rows.start) - np.cos(rows.end)) + rows.step * swept)
+    around = rows.r * rows.width * (2.0 * np.pi / rows.spacing)
+    return float(around @ chip), float(around @ swept)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.cutting.calibration import NAMES, ForceCalibration, plausible
+from rcsa_ident.cutting.calibration import NAMES, TOGETHER, ForceCalibration, leaning, plausible
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import unit_lines
 from rcsa_ident.cutting.force_record import ANGLES, ForceRecord
@@ -114,7 +114,7 @@ class _Problem:
     def columns(self, k: int, theta: FloatArray) -> ComplexArray:
         """Lines per scaled coefficient as the sensors see them, shape (m, 2, 4)."""
         record, orders = self.records[k], self.orders[k]
-        columns = unit_lines(self.cutter(k, theta), record.conditions, orders, runout=bool(self.clampings)) * self.scale
+        columns = unit_lines(self.cutter(k, theta), record.conditions, orders, runout=bool(self.clampings))[:, :, :4] * self.scale
         columns = columns * np.exp(1j * orders * theta[self.angles][k])[:, None, None]
         return columns * self.dynamometer.response(orders * record.conditions.spindle_speed, theta[self.sensor])[:, :, None]
 
@@ -345,7 +345,7 @@ def _learn(problem: _Problem, theta: FloatArray) -> None:
 
 
 def _answer(problem: _Problem, theta: FloatArray) -> SignalCalibration:
-    notes: list[str] = []
+    notes = [TOGETHER] if any(leaning(r.cutter, r.conditions) for r in problem.records) else []
     slope, left = problem.jacobian(theta), problem.residual(theta)
     count = [2 * 2 * o.size for o in problem.orders]
     edges = np.concatenate([[0], np.cumsum(count)])

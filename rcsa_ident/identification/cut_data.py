@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -26,6 +26,7 @@ def prepare(
     teeth: Mapping[str, int],
     coefficient_spread: Sequence[float] = (),
     turning: Mapping[str, Turning] | None = None,
+    unlike: Collection[str] = (),
 ) -> IdentificationData:
     """Return the data of all measurements; each tool-holder is asked once for the frequencies of all its cuts.
 
@@ -40,6 +41,8 @@ def prepare(
         taken as they are, and cutters to run true.
     turning : mapping of tooling to Turning, optional
         Asked only where both planes are fitted together.
+    unlike : collection of str
+        Toolings whose teeth are unlike: a delay is one of a turn, and not of a tooth's pitch.
 
     Raises
     ------
@@ -104,7 +107,7 @@ def prepare(
         )
     speed = np.array([m.spindle_speed for m in measurements])
     index = np.array([toolings.index(m.tooling) for m in measurements])
-    prior, clamping, edge = _cut_priors(measurements, speed, teeth)
+    prior, clamping, edge = _cut_priors(measurements, speed, teeth, unlike)
     return IdentificationData(
         cut_ids=tuple(m.cut_id for m in measurements),
         cut_tooling=index,
@@ -166,13 +169,15 @@ def _both_forces(lines: Sequence[tuple[AxisLines, int]], uncertain: Sequence[int
 
 
 def _cut_priors(
-    measurements: Sequence[CutMeasurement], speed: FloatArray, teeth: Mapping[str, int]
+    measurements: Sequence[CutMeasurement], speed: FloatArray, teeth: Mapping[str, int], unlike: Collection[str]
 ) -> tuple[CutPrior, np.ndarray, FloatArray]:
     """What is known of each cut's delay and air-cut angle; which clamping its trigger belongs to, and that trigger's edge."""
     count = len(measurements)
     delay, delay_weight, edge = np.zeros(count), np.zeros(count), np.zeros((count, 2))
     angle_weight = np.array([1.0 / max(m.alignment_std, 1e-4) ** 2 for m in measurements])
-    tooth_period = np.array([2.0 * np.pi / speed[k] / teeth[m.tooling] for k, m in enumerate(measurements)])
+    passing = np.array([teeth[m.tooling] for m in measurements], dtype=float)
+    pitches = np.where([m.tooling in unlike for m in measurements], passing, 1.0)
+    tooth_period = 2.0 * np.pi / speed / passing * pitches
     clamping = np.full(count, -1)
     names: dict[str, int] = {}
     for k, m in enumerate(measurements):
@@ -183,4 +188,4 @@ def _cut_priors(
         else:
             clamping[k] = names.setdefault(m.clamping or m.tooling, len(names))
             edge[k] = m.delay, 1.0 / m.delay_std**2
-    return CutPrior(delay, delay_weight, angle_weight, tooth_period), clamping, edge
+    return CutPrior(delay, delay_weight, angle_weight, tooth_period, pitches), clamping, edge

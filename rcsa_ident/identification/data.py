@@ -213,15 +213,20 @@ class CutPrior:
     angle_weight : array [1/rad^2]
         Inverse variance of the angle between cut and air cut, whose mean is 0.
     tooth_period : array [s]
-        In which the delay may lie anywhere where nothing is known of it.
+        In which the delay may lie anywhere where nothing is known of it: a turn where teeth are unlike.
+    pitches : array
+        How many teeth pass in it; by default one.
     """
 
     delay: FloatArray
     delay_weight: FloatArray
     angle_weight: FloatArray
     tooth_period: FloatArray
+    pitches: FloatArray = field(default=None)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
+        if self.pitches is None:
+            object.__setattr__(self, "pitches", np.ones_like(self.delay))
         for each in fields(self):
             object.__setattr__(self, each.name, frozen(getattr(self, each.name)))
 
@@ -231,9 +236,14 @@ class CutPrior:
         return np.stack([self.delay_weight, self.angle_weight], axis=1)
 
     @property
+    def columns(self) -> FloatArray:
+        """All side by side, shape (k, 5)."""
+        return np.stack([getattr(self, each.name) for each in fields(self)], axis=1)
+
+    @property
     def rows(self) -> FloatArray:
-        """All four side by side, as the kernel takes them, shape (k, 4)."""
-        return np.stack([self.delay, self.delay_weight, self.angle_weight, self.tooth_period], axis=1)
+        """The first four side by side, as the kernel takes them, shape (k, 4)."""
+        return np.ascontiguousarray(self.columns[:, :4])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -445,7 +455,7 @@ class IdentificationData:
             cut_tooling=self.cut_tooling[keep],
             axes=tuple(replace(axis, cut=number[axis.cut]) for axis in axes),
             spindle_speed=self.spindle_speed[keep],
-            cut_prior=CutPrior(*self.cut_prior.rows[keep].T),
+            cut_prior=CutPrior(*self.cut_prior.columns[keep].T),
             clamping=self.clamping[keep],
             edge=self.edge[keep],
         )

@@ -86,7 +86,7 @@ def with_tests(cuts: IdentificationData | None, tests: Sequence[HammerLines], at
         toolings=toolings,
         axes=tuple(axes),
         spindle_speed=np.concatenate([cuts.spindle_speed, still]),
-        cut_prior=CutPrior(*np.concatenate([cuts.cut_prior.rows, prior.rows]).T),
+        cut_prior=CutPrior(*np.concatenate([cuts.cut_prior.columns, prior.columns]).T),
         clamping=np.concatenate([cuts.clamping, apart]),
         edge=np.concatenate([cuts.edge, np.zeros((len(tests), 2))]),
         coefficient_spread=spread,

@@ -128,7 +128,7 @@ class Misfit:
         prior = self._cut_prior(theta, layout)
         at_lines = self._in_order([m.ravel() for m in models])
         lines = self._in_order(self._seen(theta, layout)) if self.data.talk_place else self._lines
-        fit_cuts(lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid)
+        fit_cuts(lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid * int(prior.pitches.max()))
         residual = self._residual(theta, layout, models, nuisance, prior)
         linear = self._linearise(theta, layout, answers, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.tool_holder.drawings import RoughToolings
@@ -36,6 +36,25 @@ def with_scales(data: IdentificationData, depth: FloatArray, gain: FloatArray, d
         columns.append(np.hstack([of_tooling, own, lagging]))
     # a delay stands in units of its spread
     return data.with_unknowns((*depth[deep].tolist(), *gain[loud].tolist(), *(1.0,) * late.size), columns)
+
+
+def with_corners(data: IdentificationData, owners: Sequence[str], changes: Sequence[ComplexArray]) -> IdentificationData:
+    """Return the same data whose cutters may have other corner radii than told.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    owners : sequence of str, length of the data's toolings
+        Tools of one model have one corner radius; empty where it is known exactly.
+    changes : sequence of complex array, one an axis, shape (n,)
+        Logarithms of the ratio of each line's force with a corner radius that is larger by its standard deviation.
+    """
+    unknowns = [owner for owner in dict.fromkeys(owners) if owner]
+    if not unknowns:
+        return data
+    owned = np.array([owner == each for owner in owners for each in unknowns]).reshape(len(owners), -1)
+    columns = [owned[data.cut_tooling[axis.cut]] * change[:, None] for axis, change in zip(data.axes, changes, strict=True)]
+    return data.with_unknowns((1.0,) * len(unknowns), columns)
 
 
 def with_cross_talk(data: IdentificationData, spread: FloatArray) -> IdentificationData:

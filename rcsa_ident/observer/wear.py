@@ -112,7 +112,8 @@ def wear_indicators(
     Notes
     -----
     F(m) = sum_c K_c B_c(m) e^{i m angle}: lines are linear in the coefficients (`cutting.force.force_lines`), the angle is one
-    number for the record. A revolution's real and imaginary parts in X and Y give 4 equations a harmonic for 4 unknowns.
+    number for the record. A revolution's real and imaginary parts in X and Y give 4 equations a harmonic for 4 unknowns. Where the edge
+    leans, X and Y of one depth cannot tell radial from axial coefficients: the radial ones stand for both.
     """
     force = np.asarray(force, dtype=float)
     if force.ndim != 2 or force.shape[1] != 2:
@@ -128,7 +129,7 @@ def wear_indicators(
     if harmonic.size == 0:
         raise InputError("band", [w / (2.0 * np.pi) for w in band], "one that holds a tooth-passing harmonic [Hz]")
     lines = _revolution_lines(force, first, period, turns, harmonic, speed * step)
-    basis = unit_lines(cutter, conditions, harmonic)[:, :, : 4 if edges else 2]
+    basis = unit_lines(cutter, conditions, harmonic)[:, :, : len(COEFFICIENTS) if edges else 2]
     mean = lines.mean(axis=0)
     angle = _angle(mean, basis, harmonic, cutter) if angle is None else angle
     matrix = basis * np.exp(1j * harmonic * angle)[:, None, None]

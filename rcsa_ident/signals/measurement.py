@@ -12,7 +12,7 @@ from rcsa_ident.arrays import ComplexArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import force_and_slope
+from rcsa_ident.cutting.force import SLOPES, ForceTerm, force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.remarks import Remark, says
@@ -30,6 +30,8 @@ from rcsa_ident.units import to_hz
 MAX_FREQUENCY = 4300.0
 #: Share of the largest force line below which a line says nothing.
 WEAKEST_FORCE = 1e-3
+#: Share of a force line that the usual run-out may change at orders that only unlike teeth have: there it is of the first order.
+_MOST_RUNOUT = 0.02
 #: An air cut may turn this much more slowly, and still needs the cut's highest line.
 _AIR_BEYOND = 1.02
 _MOTION = "a displacement sensor for X or Y, or an accelerometer on the spindle's housing"
@@ -206,7 +208,7 @@ def measure_cut(
     reasons = cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
     if reasons:
         return left_out(reasons, *found)
-    kept = cross_lines(steady, still, angle, harmonic, cutter, conditions, coefficients, estimator)
+    kept = cross_lines(steady, still, angle, forced_orders(cutter, steady.highest_order), cutter, conditions, coefficients, estimator)
     speed = steady.spindle_speed
     trigger = trigger_delay(cut, speed, cutter.teeth, *followed(steady))
     felt = workpiece_lines(steady, still, angle, harmonic, cutter, conditions, coefficients)
@@ -228,6 +230,11 @@ def _same_sensors(cut: Recording, air: Recording, axes: Sequence[Dof]) -> None:
         missing = next((each for each in told if told.count(each) > found.count(each)), None)
         words = "other sensors" if missing is None else f"no {missing[0]} {str(missing[1]).upper()}"
         raise InputError("sensors", f"{words} in the air cut", "the same sensors for a cut and its air cut")
+
+
+def forced_orders(cutter: Cutter, highest: int) -> np.ndarray:
+    """Return the spindle's orders, up to the highest, at which a cutter that runs true has a force: all of them where teeth are unlike."""
+    return np.arange(cutter.repeats, highest + 1, cutter.repeats)
 
 
 def cross_lines(
@@ -262,9 +269,10 @@ def cross_lines(
     weakest = WEAKEST_FORCE * np.abs(force).max()
     measured = [0 if axis is Dof.X else 1 for axis in axes]
     other = [1 - m for m in measured]
-    strong = np.abs(force[:, measured]) > weakest
-    own = np.where(strong, force[:, measured], max(weakest, 1e-300))
-    lines = estimator.lines(steady, still, angle, harmonic, own, slope[:, measured])
+    own = (harmonic % cutter.teeth == 0)[:, None] | (np.abs(slope[:, measured, SLOPES.index(ForceTerm.RUNOUT)]) < _MOST_RUNOUT)
+    strong = (np.abs(force[:, measured]) > weakest) & own
+    pushed = np.where(strong, force[:, measured], max(weakest, 1e-300))
+    lines = estimator.lines(steady, still, angle, harmonic, pushed, slope[:, measured])
     both = {a: replace(lines[a], across=force[:, o], across_slope=slope[:, o]) for a, o in zip(axes, other, strict=True)}
     return {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
 

@@ -25,6 +25,7 @@ from rcsa_ident.signals.measurement import (
     Reading,
     cross_lines,
     cut_faults,
+    forced_orders,
     visible_harmonics,
 )
 from rcsa_ident.signals.motion import motion_channels, workpiece_channels
@@ -203,7 +204,8 @@ def measure_pass(
         if reasons:
             bad.append(reasons[0])
             continue
-        kept = cross_lines(steady, beside, angle, harmonic, cutter, conditions, coefficients)
+        orders = forced_orders(cutter, steady.highest_order)
+        kept = cross_lines(steady, beside, angle, orders, cutter, conditions, coefficients)
         speed = steady.spindle_speed
         std = float(np.hypot(turning.std, _ANGLE_STD if beside is None else alignment_std)) / speed
         for axis, count in visible_harmonics(steady).items():

@@ -31,6 +31,8 @@ class Spread:
     spindle_joint : float [-]
         Of the joint in front of the flange, in each clamping.
     segment_length : float [m]
+    corner_radius : float [m]
+        Of the cutting edge; a flat end mill's corners are usually broken.
 
     Examples
     --------
@@ -47,6 +49,7 @@ class Spread:
     reclamping: float = 0.1
     spindle_joint: float = 0.05
     segment_length: float = 0.05e-3
+    corner_radius: float = 0.1e-3
 
     def __post_init__(self) -> None:
         for name in SPREAD_FIELDS:
@@ -64,7 +67,7 @@ class Spread:
 
 SPREAD_FIELDS = tuple(each.name for each in fields(Spread))
 #: Those that are lengths [m]; the others are shares.
-LENGTHS = ("stickout", "segment_length")
+LENGTHS = ("stickout", "segment_length", "corner_radius")
 #: Largest standard deviations that anybody may believe in.
 LARGEST_LENGTH, LARGEST_SHARE = 5e-3, 3.0
 #: Everything as drawn.

@@ -32,33 +32,36 @@ def passed(step, ahead, angle, places):
 
 
 @numba.njit(cache=True)
-def cut_force(position, tooth, places, cut, slices, before, path, force):
-    """Write the force per slice sum at one instant into `force`, in feed and normal direction.
+def cut_force(position, tooth, edges, places, cut, before, path, force):
+    """Write the force at one instant into `force`, in feed and normal direction and along the axis towards the spindle.
 
-    position: feed-axis position of the tool at the instant, shape (2,); tooth: angle, run-out a row; places: steps at which tooth j + 1 + k
-    stood where j is now, shape (teeth, passes); before: feed per step before the first; path: earlier positions.
-    cut: angle of tooth 1, entry, exit, smear, lag, force per slice: K_t b, K_r b, edge t b, edge r b.
+    position: feed-axis position of the tool at the instant, shape (2,); tooth: angle of each, shape (teeth,); edges: lag, offset, sine and
+    cosine of its lean, width, entry, exit and spread along the helix of each tooth's levels, shape (teeth, levels, 8); places: steps at
+    which tooth j + 1 + k stood where j is now, shape (teeth, passes) or, where lags are unlike, (teeth, passes x levels); before: feed per
+    step before the first; path: earlier positions.
+    cut: angle of tooth 1, rotation in a step, then the force per width and chip, and per width: tangential, radial, axial, and their edges.
     """
-    theta, entry, leave, smear, lag = cut[0], cut[1], cut[2], cut[3], cut[4]
-    force[0] = 0.0
-    force[1] = 0.0
-    teeth, passes = places.shape
+    force[:] = 0.0
+    teeth, levels = edges.shape[0], edges.shape[1]
+    passes = teeth
+    own = places.shape[1] // passes
     turn = 2.0 * math.pi
     for j in range(teeth):
-        for k in range(slices):
-            phi = theta + tooth[j, 0] - (k + 0.5) * lag
+        for k in range(levels):
+            entry, leave, smear = edges[j, k, 5], edges[j, k, 6], max(cut[1], edges[j, k, 7])
+            phi = cut[0] + tooth[j] - edges[j, k, 0]
             phi -= turn * math.floor(phi / turn)
-            # share of the slice and of the step that is inside the immersion
+            # share of the level and of the step that is inside the immersion
             share = min(max((phi - entry) / smear + 0.5, 0.0), 1.0) - min(max((phi - leave) / smear + 0.5, 0.0), 1.0)
             if phi > turn - smear:
-                share += min(max((phi - turn - entry) / smear + 0.5, 0.0), 1.0)
+                share += min(max((phi - turn - entry) / smear + 0.5, 0.0), 1.0) - min(max((phi - turn - leave) / smear + 0.5, 0.0), 1.0)
             if share <= 0.0:
                 continue
             s, c = math.sin(phi), math.cos(phi)
             chip = 1e300
             for m in range(passes):
                 other = (j + 1 + m) % teeth
-                back = places[j, m]
+                back = places[j, m * own + (k if own > 1 else 0)]
                 if back < 0.0:
                     # before the first instant the tool moved along its path without vibration
                     x, y = path[0, 2] + before * back, 0.0
@@ -67,28 +70,35 @@ def cut_force(position, tooth, places, cut, slices, before, path, force):
                     part = back - i
                     x = path[i, 0] + part * (path[i + 1, 0] - path[i, 0])
                     y = path[i, 1] + part * (path[i + 1, 1] - path[i, 1])
-                left = (position[0] - x) * s + (position[1] - y) * c + tooth[j, 1] - tooth[other, 1]
+                left = (position[0] - x) * s + (position[1] - y) * c + edges[j, k, 1] - edges[other, k, 1]
                 chip = min(chip, left)
             if chip <= 0.0:
                 continue
-            tangential = share * (cut[5] * chip + cut[7])
-            radial = share * (cut[6] * chip + cut[8])
-            force[0] += -c * tangential - s * radial
-            force[1] += s * tangential - c * radial
+            sine, cosine = edges[j, k, 2], edges[j, k, 3]
+            chip *= sine
+            share *= edges[j, k, 4]
+            tangential = share * (cut[2] * chip + cut[5])
+            radial = share * (cut[3] * chip + cut[6])
+            axial = share * (cut[4] * chip + cut[7])
+            inward = radial * sine + axial * cosine
+            force[0] += -c * tangential - s * inward
+            force[1] += s * tangential - c * inward
+            force[2] += radial * cosine - axial * sine
 
 
 @numba.njit(cache=True)
-def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
+def mill(decay, gain, shape, state, teeth, ahead, cut, turn, course, force):
     """March the spindle through a cut and return its outputs, shape (n, o).
 
     decay: e^{pole dt}, shape (p, m), in p equal parts of the cut one after the other; gain: of the old and the new force, shape
     (p, 2, m, 2); shape: outputs of the poles, shape (p, o, m), the first two the tip's X and Y, doubled for the conjugate poles; state: of
     the poles at the start, shape (m,);
-    ahead: angles as in `passed`; cut: as in `cut_force`, then the number of slices; turn: feed axes in machine axes, shape (2, 2);
-    course: angle of tooth 1, way of the feed and share of the width that is cut, shape (n, 3); force: shape (n, 2), is filled, in
-    machine axes. The force between two instants is linear, so the march is exact in it.
+    teeth: angles and edges as in `cut_force`; ahead: angles as in `passed`; cut: as in `cut_force`; turn: feed axes in machine axes, shape
+    (2, 2); course: angle of tooth 1, way of the feed and share of the width that is cut, shape (n, 3); force: shape (n, 3), is filled: in
+    machine axes, and along z, which moves nothing. The force between two instants is linear, so the march is exact in it.
     """
-    n, slices = force.shape[0], int(cut[9])
+    n = force.shape[0]
+    tooth, edges = teeth
     parts, m = decay.shape
     outputs = shape.shape[1]
     result = np.zeros((n, outputs))
@@ -99,7 +109,7 @@ def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
     before = course[1, 1] - course[0, 1]
     places = -ahead / (angle[1] - angle[0])
     now = cut.copy()
-    local = np.zeros(2)
+    local = np.zeros(3)
     position = np.zeros(2)
     instant = np.zeros((parts, 2, 2))
     for p in range(parts):
@@ -134,11 +144,12 @@ def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
                 y += instant[p, 1, 0] * gx + instant[p, 1, 1] * gy
             position[0] = turn[0, 0] * x + turn[1, 0] * y + course[i, 1]
             position[1] = turn[0, 1] * x + turn[1, 1] * y
-            cut_force(position, tooth, places, now, slices, before, path, local)
+            cut_force(position, tooth, edges, places, now, before, path, local)
             gx = course[i, 2] * (turn[0, 0] * local[0] + turn[0, 1] * local[1])
             gy = course[i, 2] * (turn[1, 0] * local[0] + turn[1, 1] * local[1])
         force[i, 0] = gx
         force[i, 1] = gy
+        force[i, 2] = course[i, 2] * local[2]
         path[i, 0] = position[0]
         path[i, 1] = position[1]
         if i > 0:

@@ -10,10 +10,11 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, same_everywhere
+from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual._kernels import mill
+from rcsa_ident.virtual.levels import levels_of
 from rcsa_ident.virtual.reduction import Poles
 from rcsa_ident.virtual.workpiece_side import WORKPIECE
 
@@ -51,6 +52,8 @@ class CutHistory:
         Immersion angle of tooth 1 at the tip, from the feed's normal, growing.
     force : array, shape (n, 2) [N]
         Force on the tool, machine axes X and Y.
+    axial : array, shape (n,) [N]
+        Force on the tool along z, from the tip to the spindle; the machine is rigid that way.
     tip, flange, fixture : arrays, shape (n, 2) [m]
         Absolute displacements, X and Y; the tip's is relative to the workpiece where that gives way, too.
     acceleration : array, shape (n, 2 + 2 h) [m/s^2]
@@ -60,6 +63,7 @@ class CutHistory:
     step: float
     angle: FloatArray
     force: FloatArray
+    axial: FloatArray
     tip: FloatArray
     flange: FloatArray
     fixture: FloatArray
@@ -67,7 +71,7 @@ class CutHistory:
 
     def after(self, count: int) -> CutHistory:
         """Return the history without its first `count` instants."""
-        series = (self.angle, self.force, self.tip, self.flange, self.fixture, self.acceleration)
+        series = (self.angle, self.force, self.axial, self.tip, self.flange, self.fixture, self.acceleration)
         return CutHistory(self.step, *(values[count:] for values in series))
 
 
@@ -104,7 +108,7 @@ def mill_cut(
     start_angle : float [rad]
         Immersion of tooth 1 at the first instant.
     slices : int
-        Slices of the depth, for the helix.
+        Levels of the depth, for helix and shape.
     course : Course, optional
         How the spindle turns and the tool moves on and into the material, `count` instants; it takes the place of `start_angle`. Else both
         are even, in the material from the start.
@@ -118,7 +122,7 @@ def mill_cut(
     dynamics = parts[0]
     if dynamics.inputs.shape[1] != 2:
         raise InputError("inputs", dynamics.inputs.shape[1], "two: tip.x and tip.y")
-    lines = rigid_force_lines(cutter, conditions, coefficients, slices)
+    lines = rigid_force_lines(cutter, conditions, coefficients, slices)[:, :2]
     order = np.arange(lines.shape[0])
     iw = 1j * speed * order
     course = _even(conditions, cutter.teeth, step, count, start_angle) if course is None else course
@@ -139,27 +143,28 @@ def mill_cut(
     # a force at the tip accelerates the workpiece at once, the housing only through what the basis leaves out
     through = 2.0 * (dynamics.outputs[felt] * dynamics.pole) @ dynamics.inputs
 
-    force = np.zeros((count, 2))
-    tooth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
+    force = np.zeros((count, 3))
+    teeth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
     columns = np.column_stack([course.angle, course.way, course.width])
-    result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, tooth, ahead, cut, turn, columns, force)
+    result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, teeth, ahead, cut, turn, columns, force)
     return CutHistory(
         step=step,
         angle=course.angle,
-        force=force,
+        force=force[:, :2],
+        axial=force[:, 2],
         tip=result[:, 0:2],
         flange=result[:, 2:4],
         fixture=result[:, 4:6],
-        acceleration=result[:, 6:] + force @ through.real.T,
+        acceleration=result[:, 6:] + force[:, :2] @ through.real.T,
     )
 
 
 def rigid_force_lines(
     cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, slices: int = 8, samples: int = 4 * _START_ORDERS
 ) -> np.ndarray:
-    """Return the force of a tool that does not vibrate as F = Re sum_m lines[m] e^{i m Omega t}, shape (orders, 2) [N].
+    """Return the force of a tool that does not vibrate as F = Re sum_m lines[m] e^{i m Omega t}, shape (orders, 3) [N].
 
-    Tooth 1 is at immersion 0 when t = 0; machine axes.
+    Tooth 1 is at immersion 0 when t = 0; machine axes, and z towards the spindle.
 
     Parameters
     ----------
@@ -167,17 +172,17 @@ def rigid_force_lines(
     conditions : CuttingConditions
     coefficients : CuttingCoefficients
     slices : int
-        Slices of the depth, for the helix.
+        Levels of the depth, for helix and shape.
     samples : int
         Instants of a revolution.
     """
     step = 2.0 * np.pi / conditions.spindle_speed / samples
-    tooth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
+    teeth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
     course = _even(conditions, cutter.teeth, step, samples, 0.0)
     columns = np.column_stack([course.angle, course.way, course.width])
-    force = np.zeros((samples, 2))
+    force = np.zeros((samples, 3))
     none = np.zeros((1, 2, 1), dtype=complex)
-    mill(none[:, 0], none[..., None] * np.ones(2), none, none[0, 1].copy(), tooth, ahead, cut, turn, columns, force)
+    mill(none[:, 0], none[..., None] * np.ones(2), none, none[0, 1].copy(), teeth, ahead, cut, turn, columns, force)
     lines = np.fft.rfft(force, axis=0)[:_START_ORDERS] / samples
     lines[1:] *= 2.0
     return lines
@@ -194,30 +199,21 @@ def _even(conditions: CuttingConditions, teeth: int, step: float, count: int, st
 def _cut_arrays(
     cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, step: float, slices: int
 ) -> tuple[Any, ...]:
-    """The kernel's view of a cut: teeth, angles between them, numbers, axes."""
+    """The kernel's view of a cut: teeth with their edges, angles between them, numbers, axes."""
     speed = conditions.spindle_speed
-    tooth = np.stack([cutter.tooth_angle, cutter.runout], axis=1)
-    # angle from tooth j to the 1st, 2nd, ... one ahead of it, up to itself one turn earlier
-    ahead = np.array([np.cumsum(np.roll(cutter.pitch, -j)) for j in range(cutter.teeth)])
+    levels = levels_of(cutter, conditions, slices)
+    # angle from tooth j to the 1st, 2nd, ... one ahead of it, up to itself one turn earlier; where lags are unlike, level by level
+    number = np.arange(cutter.teeth)
+    ahead = np.array([np.cumsum(np.roll(cutter.pitch, -j)) for j in number])
+    if np.ptp(levels.lag, axis=0).max() > 0.0:
+        other = (number[:, None] + 1 + number) % cutter.teeth
+        ahead = (ahead[:, :, None] + levels.lag[:, None] - levels.lag[other]).reshape(cutter.teeth, -1)
     if np.min(ahead) < speed * step:
         raise InputError("step", f"{step:g} s", f"at most a tooth period, {np.min(ahead) / speed:g} s")
-    lag = 2.0 * conditions.axial_depth / slices * np.tan(cutter.helix) / cutter.diameter
-    width = conditions.axial_depth / slices
     c = coefficients
-    cut = np.array(
-        [
-            0.0,
-            *same_everywhere(conditions.engagement).angles,
-            max(speed * step, lag),
-            lag,
-            c.tangential * width,
-            c.tangential * c.radial_ratio * width,
-            c.tangential_edge * width,
-            c.radial_edge * width,
-            slices,
-        ]
-    )
-    return tooth, ahead, cut, np.ascontiguousarray(conditions.machine_from_feed)
+    chip = c.tangential * np.array([1.0, c.radial_ratio, c.axial_ratio])
+    cut = np.array([0.0, speed * step, *chip, c.tangential_edge, c.radial_edge, c.axial_edge])
+    return (cutter.tooth_angle.copy(), levels.columns), ahead, cut, np.ascontiguousarray(conditions.machine_from_feed)
 
 
 def synchronous_lines(angle: FloatArray, values: FloatArray, orders: int) -> np.ndarray:

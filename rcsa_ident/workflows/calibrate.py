@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.cutting.calibration import ForceCalibration, calibrate_mean_force, mean_force_matrix
+from rcsa_ident.cutting.calibration import ForceCalibration, calibrate_mean_force, leaning, mean_force_matrix
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force_axes import CLEAR, AxesChoice, axes_choices
@@ -313,6 +313,9 @@ def _with_axial(found: SignalCalibration, used: Sequence[MeasuredForce]) -> Forc
     if min(m.mean.size for m in used) < 3:
         return found.forces
     mean, forces = _mean(used), found.forces
+    if any(leaning(m.record.cutter, m.record.conditions) for m in used):
+        # the signal's radial coefficients hold what the axial ones do in X and Y: taken beside them, that would count twice
+        return replace(mean, notes=(*mean.notes, "the edge leans: all coefficients from mean forces along three axes"))
     covariance = np.zeros((6, 6))
     covariance[:4, :4], covariance[4:, 4:] = forces.covariance, mean.covariance[4:, 4:]
     return replace(

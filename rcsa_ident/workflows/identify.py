@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.corner import corner_change, has_corner
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -20,7 +21,7 @@ from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification, IdentificationCode
-from rcsa_ident.identification.rough_data import with_cross_talk, with_rough_toolings, with_scales
+from rcsa_ident.identification.rough_data import with_corners, with_cross_talk, with_rough_toolings, with_scales
 from rcsa_ident.identification.workpiece_side import workpiece_side
 from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.remarks import Remark
@@ -288,17 +289,17 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
     known = campaign.coefficients
     edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
+    unlike = [name for name, t in campaign.toolings.items() if t.cutter.repeats == 1]
     turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
-    data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning)
+    data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning, unlike)
     return replace(data, softening_spread=campaign.softening_spread)
 
 
 def with_rough(data: IdentificationData, campaign: Campaign, known: KnownToolings | None = None) -> IdentificationData:
     """Return the data whose tool-holders, depths and sensors are known as well as drawings, earlier cuts and campaign say."""
     drawn = [campaign.toolings[name] for name in data.toolings]
-    rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
     # what a sweep does to a line is taken out by the drawn tool-holder's receptances around it
-    if rough is None or data.sweeps:
+    if all(t.spread.exact for t in drawn) or data.sweeps:
         return data
     depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]
     shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
@@ -308,9 +309,31 @@ def with_rough(data: IdentificationData, campaign: Campaign, known: KnownTooling
         np.array([0.0 if sensor is None else getattr(sensor, name) for sensor in sensors])
         for name in ("gain_spread", "cross_talk_spread", "delay_spread")
     )
-    data = with_cross_talk(with_scales(data, campaign.depth_spread / np.array(depths), gain, delay), talk)
+    data = with_scales(data, campaign.depth_spread / np.array(depths), gain, delay)
+    data = with_cross_talk(with_corners(data, *_corners(data, campaign)), talk)
+    rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
+    if rough is None:
+        # a corner radius is no part of a tool-holder
+        return data
     highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
     return with_rough_toolings(data, rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
+
+
+def _corners(data: IdentificationData, campaign: Campaign) -> tuple[list[str], list[ComplexArray]]:
+    """Whose corner radii are not known exactly, tooling by tooling, and what they do to the force in the lines of each axis."""
+    drawn = [campaign.toolings[name] for name in data.toolings]
+    owners = [(t.tool_model or t.name) if t.spread.corner_radius > 0.0 and has_corner(t.cutter) else "" for t in drawn]
+    conditions = {cut.id: cut.conditions for cut in campaign.cuts}
+    changes = [np.zeros(axis.omega.size, dtype=complex) for axis in data.axes]
+    for axis, change in zip(data.axes, changes, strict=True):
+        for k in np.unique(axis.cut):
+            t = data.cut_tooling[k]
+            if owners[t]:
+                own = np.flatnonzero(axis.cut == k)
+                cutter, wider = drawn[t].cutter, drawn[t].spread.corner_radius
+                ratio = corner_change(cutter, conditions[data.cut_ids[k]], campaign.coefficients, axis.order[own], wider)
+                change[own] = ratio[:, 0 if axis.axis is Dof.X else 1]
+    return owners, changes
 
 
 def _turning(campaign: Campaign, name: str, omega: FloatArray, ratio: FloatArray) -> tuple[ComplexArray, ComplexArray]:

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.chip import feed_for_chip
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import AnyEngagement, CuttingConditions
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force_directions import WORTH, gain_across, lines_of, turned
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
@@ -47,24 +49,28 @@ class CutConstraints:
     depths : tuple of float [m]
         Axial depths to choose from.
     feed_per_tooth : float [m]
-    engagement : Engagement
+    engagement : Engagement, Block, Stepover or EngagementMap
     feed_angle : float [rad]
     second_feed : float or None [rad]
         Direction of the feed of other cuts: what is felt across the planes is then told better. None: all go along `feed_angle`.
     margin : float [-]
         The stability limit is at least so many times the depth, at the speed and `SPACING` around it.
     method : StabilityMethod
+    chip_thickness : float or None [m]
+        Each tooling's feed per tooth is then the one at which its chip is nowhere thicker, and `feed_per_tooth` is not asked: high-feed
+        cutters take several times the feed of a wall.
     """
 
     lowest: float
     highest: float
     depths: tuple[float, ...]
     feed_per_tooth: float
-    engagement: Engagement
+    engagement: AnyEngagement
     feed_angle: float = 0.0
     margin: float = 1.5
     method: StabilityMethod = field(default_factory=ZeroOrder)
     second_feed: float | None = None
+    chip_thickness: float | None = None
 
     def __post_init__(self) -> None:
         positive("lowest speed", self.lowest, "rad/s")
@@ -77,6 +83,10 @@ class CutConstraints:
             positive("depth", depth, "m")
         if not 1.0 <= self.margin < np.inf:
             raise InputError("margin", self.margin, "a finite number, 1 or more")
+
+    def feed_of(self, cutter: Cutter, depth: float) -> float:
+        """Return the feed per tooth of a cutter at a depth [m]."""
+        return self.feed_per_tooth if self.chip_thickness is None else feed_for_chip(cutter, self.engagement, depth, self.chip_thickness)
 
     @property
     def feeds(self) -> tuple[float, ...]:
@@ -249,10 +259,11 @@ def plan_cuts(
 
 def alternating(allowed: CutConstraints, toolings: Sequence[Tooling], coefficients: CuttingCoefficients) -> CutConstraints:
     """Return the constraints with a feed at right angles beside the first one, where that pushes the tools in further directions."""
+    depth = max(allowed.depths)
     lines = [
         lines_of(
             tooling.cutter,
-            CuttingConditions(speed, max(allowed.depths), allowed.feed_per_tooth, allowed.engagement, allowed.feed_angle),
+            CuttingConditions(speed, depth, allowed.feed_of(tooling.cutter, depth), allowed.engagement, allowed.feed_angle),
             coefficients,
             2.0 * np.pi * MAX_FREQUENCY,
         )
@@ -316,7 +327,8 @@ def _candidates(
                     if allowed.margin * depth > limit:
                         unstable += 1
                         continue
-                    chosen = CuttingConditions(speed, depth, allowed.feed_per_tooth, allowed.engagement, feed)
+                    own_feed = allowed.feed_of(tooling.cutter, depth)
+                    chosen = CuttingConditions(speed, depth, own_feed, allowed.engagement, feed)
                     cuts.append(PlannedCut(tooling.name, chosen, limit))
     return cuts, unstable, deepest
 
@@ -341,7 +353,9 @@ def limits_at(
     speeds : array, shape (n,) [rad/s]
     """
     omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
-    process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, feed_angle)
+    # with unlike teeth the feed decides which of them cut
+    feed = allowed.feed_of(tooling.cutter, max(allowed.depths))
+    process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, feed_angle, feed_per_tooth=feed)
     limits, deepest = np.empty(speeds.size), 2.0 * allowed.margin * max(allowed.depths)
     for places, tip in tips_over_speed(machine, tooling, omega, speeds, spread=False):
         limits[places] = stability_lobes(tip, process, speeds[places], deepest, allowed.method).limit_depth

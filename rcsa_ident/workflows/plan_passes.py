@@ -137,7 +137,9 @@ def plan_passes(
                 between = f"{to_rpm(first):.0f} to {to_rpm(last):.0f} rev/min"
                 warnings.append(f"no pass with {tooling.name} from {between}: {why}")
                 continue
-            conditions = CuttingConditions(first, max(stable), allowed.feed_per_tooth, allowed.engagement, allowed.feed_angle)
+            conditions = CuttingConditions(
+                first, max(stable), allowed.feed_of(tooling.cutter, max(stable)), allowed.engagement, allowed.feed_angle
+            )
             found.append(PlannedPass(tooling.name, conditions, last, seconds, limit, tooling.cutter.teeth))
     if not found:
         raise InputError("passes", f"none stable ({warnings[0]})", "depths, speeds and toolings of which at least one is")

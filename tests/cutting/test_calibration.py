@@ -47,9 +47,9 @@ def test_lines_are_linear_in_the_coefficients(lines):
     cutter = Cutter(4, 0.012, 0.5, runout=[2e-6, 0.0, -2e-6, 0.0])
     conditions = CuttingConditions(600.0, 1e-3, 8e-5, Engagement(0.3, 2.6))
     orders = np.arange(25)
-    whole = lines(cutter, conditions, CuttingCoefficients(TRUE[0], TRUE[1] / TRUE[0], 0.0, TRUE[2], TRUE[3]), orders)
+    whole = lines(cutter, conditions, CuttingCoefficients(TRUE[0], TRUE[1] / TRUE[0], TRUE[4] / TRUE[0], TRUE[2], TRUE[3], TRUE[5]), orders)
     np.testing.assert_allclose(
-        unit_lines(cutter, conditions, orders, runout=lines is runout_force_lines) @ TRUE[:4], whole, rtol=1e-9, atol=1e-9
+        unit_lines(cutter, conditions, orders, runout=lines is runout_force_lines) @ TRUE, whole, rtol=1e-9, atol=1e-9
     )
 
 

@@ -29,18 +29,20 @@ def test_march_is_exact_for_a_force_that_is_linear_in_each_step():
     first = np.expm1(x) / x
     second = (first - 1.0) / x
     gain = STEP * np.stack([first - second, second])[:, :, None] * INPUTS
-    tooth = np.column_stack([0.5 * np.pi * np.arange(4), np.zeros(4)])
     speed, width = 1500.0, 2e-4
     ahead = np.tile(0.5 * np.pi * np.arange(1, 5), (4, 1))
-    cut = np.array([0.0, DOWN.entry, DOWN.exit, speed * STEP, 0.0, 8e8 * width, 2.4e8 * width, 8e3 * width, 6e3 * width, 1])
+    # one level of an upright edge: no lag, no offset
+    edge = np.array([0.0, 0.0, 1.0, 0.0, width, DOWN.entry, DOWN.exit, 0.0])
+    tooth = 0.5 * np.pi * np.arange(4), np.tile(edge, (4, 1, 1))
+    cut = np.array([0.0, speed * STEP, 8e8, 2.4e8, 0.0, 8e3, 6e3, 0.0])
     instants = np.arange(1200)
     course = np.column_stack([1.4 + speed * STEP * instants, 2e-7 * instants, np.ones(1200)])
-    force = np.zeros((1200, 2))
+    force = np.zeros((1200, 3))
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
     seen = mill(np.exp(x)[None], gain[None], 2.0 * OUTPUTS[None, :2], np.zeros(2, dtype=complex), tooth, ahead, cut, turn, course, force)
     state = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.diag(OMEGA**2), -np.diag(2.0 * ZETA * OMEGA)]])
     system = (state, np.vstack([np.zeros((2, 2)), WAY]), np.hstack([WAY.T, np.zeros((2, 2))]), np.zeros((2, 2)))
-    _, expected, _ = scipy.signal.lsim(system, force, STEP * np.arange(1200))
+    _, expected, _ = scipy.signal.lsim(system, force[:, :2], STEP * np.arange(1200))
     assert np.abs(force).max() > 5.0
     # the first instant's force is there before the march begins
     assert np.abs(seen - expected).max() < 1e-9 * np.abs(expected).max()

@@ -8,6 +8,7 @@ import pytest
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.experiment_design import Volume
@@ -190,3 +191,14 @@ def test_noise_is_that_of_the_lines():
     assert line_noise(cuts) == pytest.approx(2e-10 * np.hypot(1.0, 0.5), rel=1e-9)
     with pytest.raises(InputError, match="usable"):
         line_noise([])
+
+
+def test_a_chip_thickness_sets_each_cutters_feed(toolings, targets):
+    """High-feed cutters take several times the feed of a wall for the same chip; their own tooling's cuts are planned with it."""
+    flat, other = toolings
+    lean = replace(other.cutter, profile=Profile.face(other.cutter.diameter, np.radians(20.0), 5e-3))
+    allowed = replace(ALLOWED, chip_thickness=0.05e-3)
+    for cutter, times in ((flat.cutter, 1.0), (lean, 1.0 / np.sin(np.radians(20.0)))):
+        assert allowed.feed_of(cutter, 0.3e-3) == pytest.approx(times * 0.05e-3, rel=5e-3)
+    cuts = plan(toolings, targets, 2, allowed).cuts
+    assert [each.conditions.feed_per_tooth for each in cuts] == pytest.approx([0.05e-3] * 2)

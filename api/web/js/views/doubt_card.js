@@ -12,6 +12,7 @@ const SPREADS = [
   ["contact_damping_percent", "± Contact damping", "percent", 100],
   ["holder_diameter_percent", "± Holder diameters", "percent", 0.5],
   ["segment_length_mm", "± Segment lengths", "length", 0.05],
+  ["corner_radius_mm", "± Corner radius", "length", 0.1],
   ["reclamping_percent", "± Reclamping", "percent", 10, "Contact, from clamping to clamping"],
   ["spindle_joint_percent", "± Flange joint", "percent", 5, "From clamping to clamping"],
 ];
