@@ -71,3 +71,18 @@ def unit_lines(pitch, runout, diameter, helix, depth, feed_per_tooth, entry, lea
     lines *= (depth * np.exp(-1j * lag) * np.sinc(lag / np.pi) * np.where(orders == 0, 1.0, 2.0))[:, None]
     c, s = np.cos(feed_angle), np.sin(feed_angle)
     return np.array([[c, -s], [s, c]]) @ np.moveaxis(lines.reshape(-1, 4, 2), 1, 2)
+
+
+def true_unit_lines(pitch, diameter, helix, depth, feed_per_tooth, entry, leave, feed_angle, orders):
+    """The same of teeth that run true, all of them at once."""
+    phases = np.exp(1j * np.outer(orders, np.concatenate([[0.0], np.cumsum(pitch)[:-1]])))
+    feed = feed_per_tooth * pitch * pitch.size / (2.0 * np.pi)
+    none = np.zeros((5, 4))
+    shear, edges = (np.hstack([form(1.0, 0.0), form(0.0, 1.0)]) for form in (sine_form, constant_form))
+    window = exponential_integral(np.arange(-2, 3)[None, :] - orders[:, None], entry, leave) / (2.0 * np.pi)
+    chip, edge = window @ np.hstack([shear, none]), window @ np.hstack([none, edges])
+    lines = (phases @ feed)[:, None] * chip + phases.sum(axis=1)[:, None] * edge
+    lag = orders * np.tan(helix) / diameter * depth
+    lines *= (depth * np.exp(-1j * lag) * np.sinc(lag / np.pi) * np.where(orders == 0, 1.0, 2.0))[:, None]
+    c, s = np.cos(feed_angle), np.sin(feed_angle)
+    return np.array([[c, -s], [s, c]]) @ np.moveaxis(lines.reshape(-1, 4, 2), 1, 2)

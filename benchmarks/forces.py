@@ -1,0 +1,70 @@
+"""Forces as sums over rows of edge, beside the closed forms of a cylinder that were written before shapes were known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.timing import best_of, row
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.force import force_and_slope, unit_lines
+from rcsa_ident.cutting.profile import Profile
+from tests.oracles import cylinder_forces
+
+#: As many lines as a cut at 8000 rev/min shows of four teeth.
+ORDERS = 4 * np.arange(1, 9)
+COEFFICIENTS = CuttingCoefficients(902e6, 0.26, 0.1, 12e3, 10e3)
+CUT = CuttingConditions(840.0, 0.4e-3, 1e-4, Engagement.from_immersion(0.5, "down"), 0.3)
+
+
+def run() -> list[dict[str, Any]]:
+    """Force lines per coefficient with and without run-out, lines with all their slopes, and those of a corner radius."""
+    return [_lines(False), _lines(True), _slopes(), _rounded()]
+
+
+def _cylinder(runout: bool) -> Cutter:
+    return Cutter(4, 0.012, np.radians(30.0), runout=2e-6 * np.cos(0.5 * np.pi * np.arange(4) - 0.2) if runout else None)
+
+
+def _told(cutter: Cutter) -> tuple[Any, ...]:
+    engagement = CUT.engagement
+    assert isinstance(engagement, Engagement)
+    rest = (CUT.axial_depth, CUT.feed_per_tooth, engagement.entry, engagement.exit, CUT.feed_angle, ORDERS)
+    return (cutter.diameter, cutter.helix, *rest)
+
+
+def _closed(cutter: Cutter, runout: bool) -> np.ndarray:
+    if runout:
+        return np.asarray(cylinder_forces.unit_lines(cutter.pitch, cutter.runout, *_told(cutter)))
+    return np.asarray(cylinder_forces.true_unit_lines(cutter.pitch, *_told(cutter)))
+
+
+def _lines(runout: bool) -> dict[str, Any]:
+    cutter = _cylinder(runout)
+    ours, peer = unit_lines(cutter, CUT, ORDERS, runout=runout), _closed(cutter, runout)
+    error = float(np.max(np.abs(ours[..., :4] - peer) / np.abs(peer).max(axis=(0, 1))))
+    name = "lines of a cylinder per coefficient" + (" with run-out" if runout else "")
+    times = best_of(lambda: unit_lines(cutter, CUT, ORDERS, runout=runout)), best_of(lambda: _closed(cutter, runout))
+    return row(name, *(1e6 * each for each in times), "us", f"{error:.0e}")
+
+
+def _slopes() -> dict[str, Any]:
+    """The peer asks its closed forms for each coefficient by itself and for run-out, as it was done."""
+    cutter, eccentric = _cylinder(False), _cylinder(True)
+
+    def before() -> None:
+        for _ in range(5):
+            _closed(cutter, False)
+        _closed(eccentric, True)
+
+    times = best_of(lambda: force_and_slope(cutter, CUT, COEFFICIENTS, ORDERS)), best_of(before)
+    return row("lines of a cylinder with their slopes", *(1e6 * each for each in times), "us", "")
+
+
+def _rounded() -> dict[str, Any]:
+    cutter = Cutter(4, 0.012, np.radians(30.0), profile=Profile.bull_nose(0.012, 0.5e-3))
+    time = best_of(lambda: unit_lines(cutter, CUT, ORDERS))
+    return row("lines of a bull nose per coefficient", 1e6 * time, None, "us", "")
