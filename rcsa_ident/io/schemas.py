@@ -36,7 +36,11 @@ _HOLDER: dict[str, Any] = {
     "insertion_mm": 40.0,
     "segments": [{"length_mm": 40.0, "outer_diameter_mm": 50.0, "inner_diameter_mm": 14.0, "material": "steel"}],
 }
-_CUTTER = {"teeth": 4, "diameter_mm": 12.0, "helix_deg": 30.0, "pitch_deg": [90.0] * 4, "shape": "bull-nose", "corner_radius_mm": 1.0}
+_CUTTER = {
+    "teeth": 4, "diameter_mm": 12.0, "helix_deg": 30.0, "pitch_deg": [90.0] * 4, "shape": "bull-nose", "corner_radius_mm": 1.0,
+    "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5, "shape": "table", "shift": [0.0] * 4, "table": [0.0, 1.0, -1.0]},
+    "runout_mm": [0.0] * 4, "axial_runout_mm": [0.0] * 4,
+}  # fmt: skip
 _STIFF = {"translational_stiffness": 2e10, "rotational_stiffness": 6e5, "translational_damping": 6e4, "rotational_damping": 9.0}
 _PLAIN: dict[str, Any] = {
     "name": "plain",

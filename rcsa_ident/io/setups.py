@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, same_everywhere
-from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.cutters import CUTTER_KEYS, cutter_of
 from rcsa_ident.io.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
@@ -23,7 +21,6 @@ from rcsa_ident.plausibility import (
     AXIAL_DEPTH,
     CONTACT,
     DENSITY,
-    DIAMETER,
     FEED_PER_TOOTH,
     LARGEST_SWEEP,
     LEAST_SWEEP,
@@ -44,7 +41,6 @@ CAMPAIGN_FILE = "campaign.toml"
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials", "spread")
-_CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg", "shape", "corner_radius_mm")
 _SEGMENT = (
     "length_mm",
     "outer_diameter_mm",
@@ -108,7 +104,7 @@ def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
     data = read_toml(path, "tooling")
     if tip_known and "tool" not in data and "holder" not in data:
         top = Table(data, str(path), known=_TOOLING)
-        return BareCutter(top.text("name", Path(path).stem), _cutter(top.table("cutter", _CUTTER)))
+        return BareCutter(top.text("name", Path(path).stem), cutter_of(top.table("cutter", CUTTER_KEYS)))
     return tooling_of(data, str(path), Path(path).stem)
 
 
@@ -129,7 +125,7 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     tool = top.table("tool", ("stickout_mm", "segments", "model"))
     holder = top.table("holder", ("insertion_mm", "segments", "model", "taper"))
     name = top.text("name", name)
-    cutter = _cutter(top.table("cutter", _CUTTER))
+    cutter = cutter_of(top.table("cutter", CUTTER_KEYS))
     pieces = beam_segments(tool, materials)
     stickout = tool.quantity("stickout_mm", STICKOUT) * 1e-3
     insertion = holder.number("insertion_mm", "mm", least=0.0, most=5000.0) * 1e-3
@@ -172,24 +168,6 @@ def material_library(top: Table) -> dict[str, Material]:
         loss = table.quantity("loss_factor", LOSS_FACTOR, base.loss_factor if base else 0.0)
         materials[name] = Material(modulus * 1e9, density, poisson, loss)
     return materials
-
-
-def _cutter(table: Table) -> Cutter:
-    teeth = table.number("teeth", least=1, most=100, whole=True)
-    diameter = table.quantity("diameter_mm", DIAMETER) * 1e-3
-    helix = float(np.radians(table.number("helix_deg", "deg", 0.0, least=0.0, most=80.0)))
-    shape = CutterShape(table.text("shape", CutterShape.FLAT, choices=tuple(CutterShape)))
-    corner = table.number("corner_radius_mm", "mm", 0.0, least=0.0, most=1000.0) * 1e-3
-    if not shape.has_room(corner, diameter):
-        table.refuse("corner_radius_mm", f"{1e3 * corner:g}", f"at most half of the diameter, {500.0 * diameter:g} [mm]")
-    plain = Cutter(teeth, diameter, helix, shape=shape, corner_radius=corner)
-    if "pitch_deg" not in table:
-        return plain
-    degrees = np.array(table.numbers("pitch_deg", teeth, "deg"))
-    if np.any(degrees <= 0.0) or abs(degrees.sum() - 360.0) > 0.01 * teeth:
-        table.refuse("pitch_deg", f"{degrees.tolist()}, sum {degrees.sum():g}", f"{teeth} angles above 0 that add up to 360 [deg]")
-    # angles written with few decimals add up to nearly a turn
-    return replace(plain, pitch=degrees * (2.0 * np.pi / degrees.sum()))
 
 
 def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamSegment, ...]:

@@ -219,7 +219,8 @@ def test_unequal_pitch_and_a_shape_are_told_with_every_answer(shop):
     for answer in (lobes, advice):
         assert answer.withheld in answer.warnings
         assert answer.withheld.endswith("full-discretisation takes unlike teeth")
-        assert any("the cutter's shape is high-feed; its stability limits were 0.61 to 1.45 times" in w for w in answer.warnings)
+        told = "the cutter's shape is high-feed; cutting_edge_angle_deg and cutting_depth_mm are not told; its stability"
+        assert any(told in w for w in answer.warnings)
     # the limits recommend nothing, and the cuts come from the method that they name
     assert lobes.recommended_depth_mm == [None] * 3
     assert [lobes.recommended_by, advice.recommended_by] == ["full-discretisation"] * 2

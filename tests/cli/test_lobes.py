@@ -400,12 +400,12 @@ def test_cases_in_process_and_at_standstill(result_file, tmp_path):
     assert "8 of 8" in run(*common).stdout
 
 
-def test_a_ball_of_unequal_pitch_is_told_as_both(shop):
+def test_a_face_mill_of_unequal_pitch_is_told_as_both(shop):
     """Zero-order limits recommend nothing, the cuts come from the method that they name; the shape is said by every command."""
-    keys = 'teeth = 2\npitch_deg = [170, 190]\nshape = "ball"'
+    keys = 'teeth = 2\npitch_deg = [170, 190]\nshape = "face"'
     (shop / "B.toml").write_text(by_hand.TOOLING.replace("teeth = 4", keys), encoding="utf-8")
     tip, said = ("--modes", shop / "M.toml", shop / "B.toml", *KNOWN, *SPEEDS), "full-discretisation takes unlike teeth"
-    shape = "computed as a cylinder: the cutter's shape is ball"
+    shape = "computed as a cylinder: the cutter's shape is face; cutting_edge_angle_deg and cutting_depth_mm are not told"
     found = answer_of("lobes", *tip, "--out", shop / "L.csv")
     assert [sum(words in warning for warning in found["warnings"]) for words in (said, shape)] == [1, 1]
     assert said in found["withheld"]
