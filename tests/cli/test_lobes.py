@@ -16,11 +16,7 @@ import typer
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import advice, cases, export, lobes
-from rcsa_ident.cli.conditions import cut_of, immersion_of
-from rcsa_ident.cli.options import CutOptions, takes_groups
-from rcsa_ident.cutting.conditions import Block, Engagement, Stepover
-from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.profile import Profile
+from rcsa_ident.cli.conditions import immersion_of
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
@@ -204,38 +200,6 @@ def test_what_stands_around_a_cylinder_is_its_engagement(shop):
     for more in (("--stock", "block", "--y-from-mm", -6, "--y-to-mm", 0), ("--y-from-mm", -20, "--y-to-mm", 0), ("--stock", "stepover")):
         run(*base, *more)
         np.testing.assert_allclose(read_lobes_csv(shop / "L.csv").limit, plain, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("more", "engagement"),
-    [
-        ((), Stepover(0.006, "down")),
-        (("--immersion", 0.25, "--strategy", "up"), Stepover(0.003, "up")),
-        (("--immersion", 1), Engagement(0.0, np.pi)),
-        (("--stock", "block", "--y-from-mm", -6, "--y-to-mm", -2), Block(-0.006, -0.002)),
-        (("--entry-deg", 90, "--exit-deg", 180), Engagement(0.5 * np.pi, np.pi)),
-    ],
-)
-def test_what_stands_around_a_shape_reaches_the_process(more, engagement):
-    seen = []
-    app = typer.Typer()
-
-    @app.command()
-    @takes_groups
-    def ask(cut: CutOptions) -> None:
-        seen.append(cut_of(cut).process(Cutter(2, 0.012, profile=Profile.ball(0.012))))
-
-    assert CliRunner().invoke(app, [str(word) for word in (*KNOWN, "--kac", 0.2, *more)]).exit_code == 0
-    assert seen[0].engagement == engagement
-    assert seen[0].coefficients.axial_ratio == 0.2
-
-
-def test_a_map_reaches_the_process(tmp_path):
-    (tmp_path / "M.csv").write_text("z_mm,entry_angle_deg,exit_angle_deg\n0,10,40\n1,20,60\n", encoding="utf-8")
-    spec = cut_of(CutOptions(ktc_mpa=900.0, krc=0.3, engagement=tmp_path / "M.csv", lead_deg=10.0))
-    found = spec.process(Cutter(2, 0.012, profile=Profile.ball(0.012))).engagement
-    assert np.degrees(found.end).round(9).tolist() == [40.0, 60.0]
-    assert np.degrees(found.feed_rise) == pytest.approx(10.0)
 
 
 def test_without_coefficients_nothing_is_known(shop):
