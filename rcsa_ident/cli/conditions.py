@@ -87,7 +87,7 @@ def _source(text: str) -> Any:
     from rcsa_ident.io.frf_files import Source
 
     axes, sign, name = text.partition("=")
-    named = bool(sign) and axes.upper() in ("X", "Y", "XX", "YY", "XY", "YX")
+    named = bool(sign) and 1 <= len(axes) <= 2 and set(axes.upper()) <= set("XYZ")
     name = name if named else text
     pair = (axes.upper()[0], axes.upper()[-1]) if named else None
     path, mark, record = name.rpartition("#")

@@ -74,7 +74,7 @@ def _case(table: Table, folder: Path, number: int) -> Case:
 
 def _beside(text: str, folder: Path) -> str:
     axes, sign, name = text.partition("=")
-    if sign and axes.upper() in ("X", "Y", "XX", "YY", "XY", "YX"):
+    if sign and 1 <= len(axes) <= 2 and set(axes.upper()) <= set("XYZ"):
         return f"{axes}={folder / name}"
     if not text.strip():
         raise InputError("idle", "an empty text", "X=FILE, Y=FILE or FILE")

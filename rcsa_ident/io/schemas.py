@@ -158,7 +158,10 @@ _MACHINES = (
 )
 _MODE = {"natural_frequency_hz": 500.0, "damping_ratio": 0.03}
 _MODES = (
-    {"x": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}]},
+    {
+        "x": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}],
+        "z": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}],
+    },
     {
         "y": [
             _MODE | {"modal_mass_kg": 1.0, "modal_mass_sd_kg": 0.1, "natural_frequency_sd_hz": 5.0, "damping_ratio_sd": 0.01},
