@@ -70,17 +70,18 @@ class Dimensions(Shown):
         return ", ".join(f"{key_of(name)} {in_files(name, value):.6g}" for name, value in self.told.items()) or "none"
 
 
-_ANGLES = ("cutting_edge_angle", "taper")
+#: Dimensions that are angles, in degrees in files.
+ANGLES = ("cutting_edge_angle", "taper")
 
 
 def key_of(name: str) -> str:
     """Return what files call a dimension or a corner radius."""
-    return f"{name}_deg" if name in _ANGLES else f"{name}_mm"
+    return f"{name}_deg" if name in ANGLES else f"{name}_mm"
 
 
 def in_files(name: str, value: float) -> float:
     """Return a dimension [SI] in degrees or millimetres."""
-    return float(np.degrees(value)) if name in _ANGLES else 1e3 * value
+    return float(np.degrees(value)) if name in ANGLES else 1e3 * value
 
 
 class Takes(NamedTuple):
