@@ -14,6 +14,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_di
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
+from rcsa_ident.cutting.stock import AskedEngagement, Immersion, engagement_with
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPINDLE_SPEED, remarks_of
@@ -152,7 +153,7 @@ class CutSpec(Shown):
 
     Parameters
     ----------
-    engagement : Engagement, default half immersion, down-milling
+    engagement : Immersion, Engagement, Block, Stepover or EngagementMap, default half immersion, down-milling
     feed_angle : float [rad], default 0
         Direction of the feed in the machine's X-Y plane, from +X towards +Y.
     feed_per_tooth : float or None [m]
@@ -173,7 +174,7 @@ class CutSpec(Shown):
     900000000.0
     """
 
-    engagement: Engagement = field(default_factory=lambda: Engagement.from_immersion(0.5, "down"))
+    engagement: AskedEngagement = Immersion(0.5, "down")  # noqa: RUF009 - frozen
     feed_angle: float = 0.0
     feed_per_tooth: float | None = None
     material: str | None = None
@@ -188,7 +189,7 @@ class CutSpec(Shown):
         Raises
         ------
         InputError
-            If the cutting coefficients are not known, or the run-out does not fit the teeth.
+            If the cutting coefficients are not known, the run-out does not fit the teeth, or the cutter does not reach the stock.
         """
         if self.runout is not None:
             if len(self.runout) != cutter.teeth:
@@ -197,7 +198,7 @@ class CutSpec(Shown):
         return MillingProcess(
             cutter,
             self._coefficients(workpiece),
-            self.engagement,
+            engagement_with(self.engagement, cutter),
             self.feed_angle,
             self.feed_per_tooth,
             self.damping,

@@ -209,6 +209,9 @@ def _campaign(plain: Mapping[str, Any], locate: Callable[[str], Path]) -> Campai
         return tooling_of_keys(parsed(table.data[key]), "", key)
 
     def file(table: Table, key: str) -> Path:
+        if key == "engagement":
+            # no path of a client is opened, and a map is small
+            table.refuse(key, "the name of a file", "the rows of the map themselves, each z_mm, entry_angle_deg and exit_angle_deg")
         return locate(table.text(key, allowed="the name of a recording"))
 
     # hammer tests alone have no table [[cuts]]

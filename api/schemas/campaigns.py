@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from api.schemas.common import Answer, Body, Fault, Line
+from api.schemas.common import Answer, Body, EngagementRows, Fault, Line
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
 from rcsa_ident.dynamics.coordinates import Dof
@@ -114,8 +114,8 @@ class WorkpieceKeys(Body):
     edge_force_spread_n_per_mm: float | None = Field(None, description="Standard deviation of edge forces that nobody tells; 10.")
 
 
-class CutKeys(Body):
-    """[[cuts]]"""
+class CutConditions(BaseModel):
+    """What a cut was: how its cutter was engaged is told by angles, a radial depth, a block's sides, or a map."""
 
     id: Text
     tooling: Text
@@ -123,9 +123,22 @@ class CutKeys(Body):
     spindle_speed_to_rpm: float | None = Field(None, description="At which a pass ends whose speed changes evenly; null keeps the speed.")
     axial_depth_mm: float
     feed_per_tooth_mm: float
-    entry_angle_deg: float
-    exit_angle_deg: float
+    entry_angle_deg: float | None = Field(None, description="At the cutter's diameter; with a shape, down and up milling are stepovers.")
+    exit_angle_deg: float | None = None
+    radial_depth_mm: float | None = Field(None, description="With strategy, instead of the angles.")
+    strategy: Literal["up", "down"] | None = None
+    stock: Literal["stepover", "block"] | None = Field(None, description="What stood around the cutter.")
+    y_from_mm: float | None = Field(None, description="Of a block: its sides beside the cutter's path, along the normal direction.")
+    y_to_mm: float | None = None
+    engagement: EngagementRows | None = Field(None, description="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up.")
+    lead_deg: float | None = Field(None, description="By which the tool leans in the direction of the feed, with engagement.")
+    tilt_deg: float | None = None
     feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
+
+
+class CutKeys(Body, CutConditions):
+    """[[cuts]]"""
+
     cut: FileName = Field(description="Recording of the cut; only the last part of a path counts, and its suffix is the format.")
     air: FileName | None = Field(None, description="Recording at the same speed without cutting; may serve several cuts.")
 
@@ -184,18 +197,9 @@ class FileState(Answer):
     uploaded: bool
 
 
-class CutAnswer(Answer):
+class CutAnswer(Answer, CutConditions):
     """A cut of a campaign."""
 
-    id: str
-    tooling: str
-    spindle_speed_rpm: float
-    spindle_speed_to_rpm: float | None = Field(None, description="At which a pass ends whose speed changes.")
-    axial_depth_mm: float
-    feed_per_tooth_mm: float
-    entry_angle_deg: float
-    exit_angle_deg: float
-    feed_direction: str | float
     cut: FileState
     air: FileState | None
     verdict: VerdictAnswer | None = Field(description="With the recordings uploaded so far; null without the cut's recording.")

@@ -14,6 +14,8 @@ Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 #: Free text without control characters, which not every database accepts.
 Line = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+#: Rows of a map of engagement, each a height and two angles.
+EngagementRows = Annotated[list[Annotated[list[float], Field(min_length=3, max_length=3)]], Field(min_length=1, max_length=1000)]
 #: Keys of a body or of a part of it, and items of one key.
 MOST_KEYS, MOST_ITEMS = 100, 5000
 Item = TypeVar("Item")

@@ -14,7 +14,7 @@ from api.schemas.toolings import EXAMPLE
 from api.work.forces import ForceQuestion, WornQuestion
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.setups import FEED_DIRECTIONS
+from rcsa_ident.io.cuts import FEED_DIRECTIONS
 from rcsa_ident.units import from_rpm
 
 MOST_CHANNELS = 32

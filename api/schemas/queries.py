@@ -6,16 +6,19 @@ import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import ConfigDict, Field
 
-from api.schemas.common import Answer, Body, Id, Line, Name
+from api.schemas.common import Answer, Body, EngagementRows, Id, Line, Name
 from api.schemas.machines import Curve
 from api.schemas.toolings import EXAMPLE, ToolingKeys
 from api.work.requests import AdviceRequest, LobeRequest, TipRequest
-from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.conditions import Block, Engagement
 from rcsa_ident.cutting.process import ProcessDamping
+from rcsa_ident.cutting.stock import AskedEngagement, Immersion
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.setups import FEED_DIRECTIONS
+from rcsa_ident.io.cuts import FEED_DIRECTIONS
+from rcsa_ident.io.engagements import engagement_map_of
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.units import from_rpm
@@ -24,6 +27,8 @@ MOST_TOOLINGS, MOST_SPEEDS, MOST_TESTED = 12, 5000, 1000
 Angle = Annotated[float, Field(ge=0.0, le=180.0)]
 Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
 Micrometre = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Side = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+Lean = Annotated[float, Field(ge=-89.0, le=89.0)]
 Land = Annotated[float, Field(ge=0.01, le=1000.0)]
 Pressure = Annotated[float, Field(ge=1e9, le=1e17)]
 Percent = Annotated[float, Field(ge=0.0, le=50.0)]
@@ -75,11 +80,20 @@ class Cut(Body):
     strategy: Literal["up", "down"] = "down"
     entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
     exit_deg: Angle | None = None
+    stock: Annotated[
+        Literal["stepover", "block"] | None,
+        Field(description="What stands around the cutter: a stepover of the immersion, as where the same cutter cut before, or a block."),
+    ] = None
+    y_from_mm: Annotated[Side | None, Field(description="Of a block: its sides beside the path, along the normal direction.")] = None
+    y_to_mm: Side | None = None
+    engagement: Annotated[EngagementRows | None, Field(description="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up.")] = None
+    lead_deg: Annotated[Lean | None, Field(description="By which the tool leans towards the feed, with engagement.")] = None
     feed_direction: Annotated[Literal["+X", "-X", "+Y", "-Y"] | Turn, Field(description="Or degrees from +X.")] = "+X"
     feed_per_tooth_mm: float | None = None
     material: Annotated[Line | None, Field(description="Of the library of materials.")] = None
     ktc_mpa: float | None = None
     krc: float | None = None
+    kac: float | None = None
     kte_n_per_mm: float | None = None
     kre_n_per_mm: float | None = None
     runout_um: Annotated[list[Micrometre] | None, Field(max_length=100, description="Radial offset of each edge.")] = None
@@ -94,23 +108,17 @@ class Cut(Body):
         if (self.wear_land_um is None) != (self.indentation is None):
             missing = "wear_land_um" if self.wear_land_um is None else "indentation"
             raise InputError(f"cut.{missing}", "nothing", "wear_land_um and indentation, or neither")
-        if self.entry_deg is None or self.exit_deg is None:
-            engagement = Engagement.from_immersion(self.immersion, self.strategy)
-        elif self.exit_deg - self.entry_deg < 0.1:
-            raise InputError("cut.exit_deg", self.exit_deg, f"at least 0.1 above entry_deg, {self.entry_deg:g} [deg]")
-        else:
-            engagement = Engagement(math.radians(self.entry_deg), math.radians(self.exit_deg))
         direction = self.feed_direction
         angle = FEED_DIRECTIONS[direction] if isinstance(direction, str) else math.radians(direction)
         values = (
-            ("tangential", self.ktc_mpa, 1e6), ("radial_ratio", self.krc, 1.0),
+            ("tangential", self.ktc_mpa, 1e6), ("radial_ratio", self.krc, 1.0), ("axial_ratio", self.kac, 1.0),
             ("tangential_edge", self.kte_n_per_mm, 1e3), ("radial_edge", self.kre_n_per_mm, 1e3),
         )  # fmt: skip
         damping = None
         if self.wear_land_um is not None and self.indentation is not None:
             damping = ProcessDamping(self.indentation, self.wear_land_um * 1e-6, self.friction)
         return CutSpec(
-            engagement,
+            self._engagement(),
             float(angle),
             None if self.feed_per_tooth_mm is None else self.feed_per_tooth_mm * 1e-3,
             self.material,
@@ -118,6 +126,32 @@ class Cut(Body):
             None if self.runout_um is None else tuple(offset * 1e-6 for offset in self.runout_um),
             damping,
         )
+
+    def _engagement(self) -> AskedEngagement:
+        told = {
+            "engagement": self.engagement is not None,
+            "y_from_mm": self.y_from_mm is not None or self.y_to_mm is not None,
+            "entry_deg": self.entry_deg is not None,
+        }
+        fits = {None: list(told), "block": ["y_from_mm"], "stepover": []}[self.stock]
+        given = [name for name, there in told.items() if there]
+        for name in [name for name in given if name not in fits] + given[1:]:
+            raise InputError(f"cut.{name}", "given beside another", "one way to tell the engagement: angles, a block's sides, or a map")
+        if self.lead_deg is not None and self.engagement is None:
+            raise InputError("cut.lead_deg", self.lead_deg, "an angle given together with engagement [deg]")
+        if self.engagement is not None:
+            z, entry, leave = np.array(self.engagement).T
+            return engagement_map_of(z, entry, leave, math.radians(self.lead_deg or 0.0))
+        if self.stock == "block" or told["y_from_mm"]:
+            if self.y_from_mm is None or self.y_to_mm is None or not self.y_from_mm < self.y_to_mm:
+                found = f"{self.y_from_mm} and {self.y_to_mm}".replace("None", "nothing")
+                raise InputError("cut.y_from_mm", found, "y_from_mm and above it y_to_mm, the sides of the block")
+            return Block(self.y_from_mm * 1e-3, self.y_to_mm * 1e-3)
+        if self.entry_deg is None or self.exit_deg is None:
+            return Immersion(self.immersion, self.strategy)
+        if self.exit_deg - self.entry_deg < 0.1:
+            raise InputError("cut.exit_deg", self.exit_deg, f"at least 0.1 above entry_deg, {self.entry_deg:g} [deg]")
+        return Engagement(math.radians(self.entry_deg), math.radians(self.exit_deg))
 
 
 class Speeds(Body):

@@ -7,10 +7,12 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, StringConstraints
 
 from api.schemas.common import Answer, Body, Line
+from rcsa_ident.cutting.serration import WaveShape
 from rcsa_ident.cutting.shape import CutterShape
+from rcsa_ident.io.cutters import MOST_POINTS
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
-MOST_SEGMENTS = 200
+MOST_SEGMENTS, MOST_TEETH = 200, 100
 
 EXAMPLE: dict[str, Any] = {
     "name": "S1-ER32",
@@ -29,15 +31,46 @@ EXAMPLE: dict[str, Any] = {
 }
 
 
+class SerrationKeys(Body):
+    """[cutter.serration]: waves along each edge."""
+
+    amplitude_mm: float
+    wavelength_mm: float
+    shape: Text | None = Field(None, description=f"One of {', '.join(WaveShape)}; sine without it.")
+    shift: list[float] | None = Field(None, max_length=MOST_TEETH, description="Of each tooth's wave, in wavelengths.")
+    table: list[float] | None = Field(None, max_length=MOST_POINTS)
+
+
 class CutterKeys(Body):
     """[cutter]"""
 
     teeth: int
     diameter_mm: float
-    helix_deg: float = 0.0
-    pitch_deg: list[float] | None = Field(None, max_length=100)
-    shape: Text | None = Field(None, description=f"One of {', '.join(CutterShape)}; flat without it. A cylinder is computed, and said so.")
+    helix_deg: float | Annotated[list[float], Field(max_length=MOST_TEETH)] = Field(0.0, description="One angle, or one a tooth.")
+    helix_kind: Text | None = Field(None, description="lead, or angle where the edge stands at one angle to the axis at any radius.")
+    pitch_deg: list[float] | None = Field(None, max_length=MOST_TEETH)
+    shape: Text | None = Field(
+        None, description=f"One of {', '.join(CutterShape)}; flat without it. Without the keys that draw it, it is computed as a cylinder."
+    )
     corner_radius_mm: float | None = None
+    cutting_edge_angle_deg: float | None = Field(None, description="KAPR, from the floor to the edge.")
+    taper_deg: float | None = Field(None, description="From the axis to the edge.")
+    largest_diameter_mm: float | None = Field(None, description="DCX, where the edge ends.")
+    cutting_depth_mm: float | None = Field(None, description="APMX, from the tip to where the edge ends.")
+    wiper_mm: float | None = Field(None, description="BS, length of the flat beside the corner.")
+    profile_radius_mm: float | None = Field(None, description="PRFRAD, of the long arc.")
+    axial_distance_mm: float | None = Field(None, description="From the tip to where a barrel is widest.")
+    upper_radius_mm: float | None = None
+    tip_diameter_mm: float | None = None
+    neck_diameter_mm: float | None = None
+    tip_length_mm: float | None = None
+    profile: list[Annotated[list[float], Field(min_length=2, max_length=3)]] | None = Field(
+        None, max_length=MOST_POINTS, description="Points r, z from the tip up, and the radius of the arc to each where it is one."
+    )
+    serration: SerrationKeys | None = None
+    runout_mm: list[float] | None = Field(None, max_length=MOST_TEETH)
+    axial_runout_mm: list[float] | None = Field(None, max_length=MOST_TEETH)
+    tilt_deg: float | None = None
 
 
 class SegmentKeys(Body):

@@ -38,6 +38,8 @@ _OPTIONS = {
     "tangential coefficient": ("ktc_mpa", ""),
     "radial ratio": ("krc", ""),
     "radial_ratio": ("krc", ""),
+    "axial_ratio": ("kac", ""),
+    "y_from and y_to": ("y_from_mm", ""),
     "tangential_edge": ("kte_n_per_mm", ""),
     "radial_edge": ("kre_n_per_mm", ""),
     "runout": ("runout_um", "in um"),

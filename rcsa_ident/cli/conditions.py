@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcsa_ident.cli.options import CutOptions, DriveOptions, SpeedOptions, Strategy, TipOptions
+from rcsa_ident.cli.options import CutOptions, DriveOptions, SpeedOptions, Stock, Strategy, TipOptions
 from rcsa_ident.errors import InputError
 from rcsa_ident.units import from_rpm, inclusive
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rcsa_ident.cutting.conditions import Engagement
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
+    from rcsa_ident.cutting.stock import AskedEngagement
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.machine.machine import TipSource
     from rcsa_ident.machining_setup import CutSpec, Tooling
@@ -86,7 +87,7 @@ def _source(text: str) -> Any:
     from rcsa_ident.io.frf_files import Source
 
     axes, sign, name = text.partition("=")
-    named = bool(sign) and axes.upper() in ("X", "Y", "XX", "YY", "XY", "YX")
+    named = bool(sign) and 1 <= len(axes) <= 2 and set(axes.upper()) <= set("XYZ")
     name = name if named else text
     pair = (axes.upper()[0], axes.upper()[-1]) if named else None
     path, mark, record = name.rpartition("#")
@@ -125,10 +126,11 @@ def cut_of(cut: CutOptions, speed_variation: str | None = None) -> CutSpec:
 
     given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}
     given |= {} if cut.krc is None else {"radial_ratio": cut.krc}
+    given |= {} if cut.kac is None else {"axial_ratio": cut.kac}
     given |= {} if cut.kte_n_per_mm is None else {"tangential_edge": cut.kte_n_per_mm * 1e3}
     given |= {} if cut.kre_n_per_mm is None else {"radial_edge": cut.kre_n_per_mm * 1e3}
     return CutSpec(
-        engagement(cut.immersion, cut.strategy, cut.entry_deg, cut.exit_deg),
+        _stock(cut),
         feed_angle(cut.feed_direction),
         None if cut.feed_per_tooth_mm is None else cut.feed_per_tooth_mm * 1e-3,
         cut.material,
@@ -137,6 +139,36 @@ def cut_of(cut: CutOptions, speed_variation: str | None = None) -> CutSpec:
         _damping(cut),
         _variation(speed_variation),
     )
+
+
+def _stock(cut: CutOptions) -> AskedEngagement:
+    """How the cutter is engaged: by a map, by a block's sides, by angles, or by an immersion, which is a stepover to a shape."""
+    from rcsa_ident.cutting.conditions import Block
+    from rcsa_ident.cutting.stock import Immersion
+    from rcsa_ident.io.engagements import read_engagement_map
+
+    angles, sides = cut.entry_deg is not None or cut.exit_deg is not None, cut.y_from_mm is not None or cut.y_to_mm is not None
+    told = {"--engagement": cut.engagement is not None, "--y-from-mm": sides, "--entry-deg": angles}
+    given = [name for name, there in told.items() if there]
+    if len(given) > 1:
+        raise InputError(given[1], f"given beside {given[0]}", "one way to tell the engagement")
+    fits = ["--y-from-mm"] if cut.stock is Stock.block else []
+    if cut.stock is not None and (wrong := [name for name in given if name not in fits]):
+        allowed = "--y-from-mm and --y-to-mm" if fits else "--immersion and --strategy"
+        raise InputError(wrong[0], f"given beside --stock {cut.stock}", f"{allowed} for that stock")
+    if cut.lead_deg is not None and (cut.engagement is None or not abs(cut.lead_deg) < 90.0):
+        raise InputError("--lead-deg", cut.lead_deg, "an angle between -90 and 90 [deg], given together with --engagement")
+    if cut.engagement is not None:
+        return read_engagement_map(cut.engagement, math.radians(cut.lead_deg or 0.0))
+    if sides or cut.stock is Stock.block:
+        if cut.y_from_mm is None or cut.y_to_mm is None:
+            raise InputError("--y-from-mm and --y-to-mm", "one of them" if sides else "nothing", "both sides of the block [mm]")
+        if not cut.y_from_mm < cut.y_to_mm:
+            raise InputError("--y-to-mm", cut.y_to_mm, f"above --y-from-mm, {cut.y_from_mm:g} [mm]")
+        return Block(cut.y_from_mm * 1e-3, cut.y_to_mm * 1e-3)
+    if angles:
+        return engagement(cut.immersion, cut.strategy, cut.entry_deg, cut.exit_deg)
+    return Immersion(immersion_of(cut.immersion), str(cut.strategy))
 
 
 def _damping(cut: CutOptions) -> ProcessDamping | None:
@@ -197,7 +229,7 @@ def immersion_of(text: str) -> float:
 
 def feed_angle(text: str) -> float:
     """Return the feed direction [rad] of +X, -X, +Y, -Y or degrees."""
-    from rcsa_ident.io.setups import FEED_DIRECTIONS
+    from rcsa_ident.io.cuts import FEED_DIRECTIONS
 
     if text.upper() in FEED_DIRECTIONS:
         return FEED_DIRECTIONS[text.upper()]

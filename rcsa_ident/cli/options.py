@@ -22,6 +22,13 @@ class Strategy(StrEnum):
     down = "down"
 
 
+class Stock(StrEnum):
+    """What stands around a cutter."""
+
+    stepover = "stepover"
+    block = "block"
+
+
 def takes_groups(command: Callable[..., Any]) -> Callable[..., Any]:
     """Spread the groups among a command's parameters into options of their own."""
     hints = get_type_hints(command, include_extras=True)
@@ -92,6 +99,32 @@ class CutOptions:
         typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False, rich_help_panel=_CUT),
     ] = None
     exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False, rich_help_panel=_CUT)] = None
+    stock: Annotated[
+        Stock | None,
+        typer.Option(
+            help="What stands around the cutter: stepover of --immersion, as where the same cutter cut before (the default), or a block.",
+            show_default=False,
+            rich_help_panel=_CUT,
+        ),
+    ] = None
+    y_from_mm: Annotated[
+        float | None,
+        typer.Option(help="One side of a block, mm beside the cutter's path along the normal.", show_default=False, rich_help_panel=_CUT),
+    ] = None
+    y_to_mm: Annotated[float | None, typer.Option(help="The other side, mm.", show_default=False, rich_help_panel=_CUT)] = None
+    engagement: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MAP.csv",
+            help="Angles between which the edge cuts at each height: z_mm, entry_angle_deg, exit_angle_deg.",
+            show_default=False,
+            rich_help_panel=_CUT,
+        ),
+    ] = None
+    lead_deg: Annotated[
+        float | None,
+        typer.Option(help="How far the tool leans towards the feed, degrees; with --engagement.", show_default=False, rich_help_panel=_CUT),
+    ] = None
     feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.", rich_help_panel=_CUT)] = "+X"
     feed_per_tooth_mm: Annotated[
         float | None, typer.Option(help="Feed per tooth, mm: power, run-out, surface error.", show_default=False, rich_help_panel=_CUT)
@@ -105,6 +138,9 @@ class CutOptions:
     ] = None
     krc: Annotated[
         float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False, rich_help_panel=_CUT)
+    ] = None
+    kac: Annotated[
+        float | None, typer.Option(help="Axial ratio; default: the result's workpiece, or 0.", show_default=False, rich_help_panel=_CUT)
     ] = None
     kte_n_per_mm: Annotated[float | None, typer.Option(help="Tangential edge force, N/mm.", show_default=False, rich_help_panel=_CUT)] = (
         None

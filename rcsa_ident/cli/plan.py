@@ -145,8 +145,8 @@ def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, s
     from rich.table import Table
 
     from rcsa_ident.cli.tables import show
+    from rcsa_ident.io.cuts import cut_keys
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.setups import cut_keys
     from rcsa_ident.io.toml_text import toml_of
 
     names = [f"{each.tooling}-pass-{i:02d}" for i, each in enumerate(planned.passes, start=1)]
@@ -179,7 +179,7 @@ def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, s
 
 def plan_text(planned: PlannedCuts) -> str:
     """Return the cuts as a campaign file has them; the recordings are named, not yet made."""
-    from rcsa_ident.io.setups import cut_keys
+    from rcsa_ident.io.cuts import cut_keys
     from rcsa_ident.io.toml_text import toml_of
 
     named = zip(_names(planned), planned.cuts, strict=True)
@@ -258,7 +258,7 @@ def _noise_of(folder: Path) -> float:
 
 
 def _direction(angle: float) -> str | float:
-    from rcsa_ident.io.setups import feed_direction_of
+    from rcsa_ident.io.cuts import feed_direction_of
 
     found = feed_direction_of(angle)
     return found if isinstance(found, str) else float(f"{found:.9g}")

@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.outlines import Dimensions, key_of, missing
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.cutting.shape import IGNORED_CORNER, CutterShape, cylinder_remark
@@ -54,6 +55,8 @@ class Cutter(Shown):
         By which each edge stands nearer to the spindle.
     tilt : float [rad], default 0
         Of the cutter's axis in the spindle, away from tooth 1: the teeth run out in proportion to the height above the tip.
+    dimensions : Dimensions
+        What the profile was drawn from, or what is told of one that could not be drawn.
 
     Examples
     --------
@@ -76,6 +79,7 @@ class Cutter(Shown):
     serration: Serration | None = None
     axial_runout: FloatArray = field(default=None)  # type: ignore[arg-type]
     tilt: float = 0.0
+    dimensions: Dimensions = field(default_factory=Dimensions)
 
     def __post_init__(self) -> None:
         if isinstance(self.teeth, bool) or int(self.teeth) != self.teeth or not 1 <= self.teeth <= 100:
@@ -186,7 +190,10 @@ class Cutter(Shown):
         if self.profile is not None:
             return ()
         sharp = depth is None or self.corner_radius <= IGNORED_CORNER * depth
-        return () if self.shape is CutterShape.FLAT and sharp else (cylinder_remark(self.shape, forces),)
+        if self.shape is CutterShape.FLAT and sharp:
+            return ()
+        lacking = tuple(key_of(name) if name != "profile" else name for name in missing(self.shape, self.corner_radius, self.dimensions))
+        return (cylinder_remark(self.shape, forces, lacking),)
 
     def __str__(self) -> str:
         parts = [f"{self.teeth} {'tooth' if self.teeth == 1 else 'teeth'}", f"Ø{1e3 * self.diameter:.4g} mm"]

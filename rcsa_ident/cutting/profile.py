@@ -164,7 +164,7 @@ class Profile(Shown):
         r, high = 0.5 * positive("diameter", diameter, "m"), _length(diameter, length)
         _corner(corner_radius, r)
         if not 0.0 <= taper < 0.5 * np.pi:
-            raise InputError("taper", taper, "an angle from 0 to less than a right one [rad]")
+            raise InputError("taper", f"{np.degrees(taper):g} degrees", "an angle from 0 to less than 90 degrees")
         if corner_radius == 0.0:
             return cls((Line(0.0, 0.0, r, 0.0), Line(r, 0.0, r + high * np.tan(taper), high)))
         arc = Arc(r - corner_radius, corner_radius, corner_radius, 0.0, 0.5 * np.pi - taper)
@@ -187,15 +187,17 @@ class Profile(Shown):
         """
         r, kappa = 0.5 * positive("diameter", diameter, "m"), cutting_edge_angle
         if not 0.0 < kappa < np.pi:
-            raise InputError("cutting_edge_angle", kappa, "an angle above 0 and below pi [rad]")
+            raise InputError("cutting_edge_angle", f"{np.degrees(kappa):g} degrees", "an angle above 0 and below 180 degrees")
         positive("depth", depth, "m")
         if r + depth / np.tan(kappa) < 0.0:
-            raise InputError("depth", depth, f"at most {-r * np.tan(kappa):g} m, where the undercut ends in the axis")
+            allowed = f"at most {-1e3 * r * np.tan(kappa):g} mm, where the undercut ends in the axis"
+            raise InputError("depth", f"{1e3 * depth:g} mm", allowed)
         if corner_radius == 0.0:
             return cls((Line(0.0, 0.0, r, 0.0), Line(r, 0.0, r + depth / np.tan(kappa), depth)))
         centre = r - corner_radius * np.tan(0.5 * kappa)
         if corner_radius < 0.0 or centre < 0.0:
-            raise InputError("corner_radius", corner_radius, f"0 to {r / np.tan(0.5 * kappa):g} m, which the floor has room for")
+            allowed = f"0 to {1e3 * r / np.tan(0.5 * kappa):g} mm, which the floor has room for"
+            raise InputError("corner_radius", f"{1e3 * corner_radius:g} mm", allowed)
         arc = Arc(centre, corner_radius, corner_radius, 0.0, kappa)
         if arc.ends[3] >= depth:
             return cls((*_floor(centre), Arc(centre, corner_radius, corner_radius, 0.0, float(np.arccos(1.0 - depth / corner_radius)))))
@@ -206,9 +208,9 @@ class Profile(Shown):
         """Return the outline of a cone from its tip to its largest diameter; `taper` is half of the point angle [rad]."""
         r, tip = 0.5 * positive("diameter", diameter, "m"), 0.5 * tip_diameter
         if not 0.0 <= tip < r:
-            raise InputError("tip_diameter", tip_diameter, f"0 to less than the diameter, {diameter:g} m")
+            raise InputError("tip_diameter", f"{1e3 * tip_diameter:g} mm", f"0 to less than the diameter, {1e3 * diameter:g} mm")
         if not 0.0 < taper < 0.5 * np.pi:
-            raise InputError("taper", taper, "an angle above 0 and below a right one [rad]")
+            raise InputError("taper", f"{np.degrees(taper):g} degrees", "an angle above 0 and below 90 degrees")
         return cls((*_floor(tip), Line(tip, 0.0, r, (r - tip) / np.tan(taper))))
 
     @classmethod
@@ -216,18 +218,21 @@ class Profile(Shown):
         """Return the outline of a ball that goes on above its equator to a neck of this diameter [m]."""
         r = 0.5 * positive("diameter", diameter, "m")
         if not 0.0 < neck < diameter:
-            raise InputError("neck", neck, f"above 0 and below the diameter, {diameter:g} m")
+            raise InputError("neck", f"{1e3 * neck:g} mm", f"above 0 and below the diameter, {1e3 * diameter:g} mm")
         return cls((Arc(0.0, r, r, 0.0, float(np.pi - np.arcsin(0.5 * neck / r))),))
 
     @classmethod
-    def hollow(cls, tip_diameter: float, corner_radius: float) -> Profile:
-        """Return the outline of a corner-rounding cutter: a hollow quarter circle above a tip of this diameter [m]."""
+    def hollow(cls, tip_diameter: float, corner_radius: float, tip_length: float = 0.0) -> Profile:
+        """Return the outline of a corner-rounding cutter: a hollow quarter circle above a tip of this diameter and length [m]."""
         r = 0.5 * positive("tip_diameter", tip_diameter, "m")
         rho = positive("corner_radius", corner_radius, "m")
-        return cls((Line(0.0, 0.0, r, 0.0), Arc(r + rho, 0.0, -rho, 0.5 * np.pi, 0.0)))
+        wall = [Line(r, 0.0, r, tip_length)] if tip_length else []
+        return cls((Line(0.0, 0.0, r, 0.0), *wall, Arc(r + rho, tip_length, -rho, 0.5 * np.pi, 0.0)))
 
     @classmethod
-    def barrel(cls, diameter: float, profile_radius: float, height: float, corner_radius: float, length: float) -> Profile:
+    def barrel(
+        cls, diameter: float, profile_radius: float, height: float, corner_radius: float, length: float, upper_radius: float = 0.0
+    ) -> Profile:
         """Return the outline of a barrel: an arc with its largest diameter at a height, above a corner that it touches.
 
         Parameters
@@ -236,22 +241,21 @@ class Profile(Shown):
             The largest diameter, and the radius of the arc there.
         height, length : float [m]
             Where it is widest, and where the edge ends.
-        corner_radius : float [m]
-            Of the arc between floor and barrel.
+        corner_radius, upper_radius : float [m]
+            Of the arcs between floor and barrel, and between barrel and the edge's upper end; without the latter it ends sharp.
         """
         r, big = 0.5 * positive("diameter", diameter, "m"), positive("profile_radius", profile_radius, "m")
         between = big - corner_radius
         if not 0.0 <= corner_radius < big or not abs(height - corner_radius) < between:
-            raise InputError("corner_radius", corner_radius, f"0 to less than the profile's radius, {big:g} m, within reach of its arc")
-        if not 0.0 < length < height + big:
-            raise InputError("length", length, f"above 0 and below {height + big:g} m, where the arc closes")
+            allowed = f"0 to less than the profile's radius, {1e3 * big:g} mm, within reach of its arc"
+            raise InputError("corner_radius", f"{1e3 * corner_radius:g} mm", allowed)
         centre = r - big
         inner = centre + np.sqrt(between**2 - (height - corner_radius) ** 2)
         if inner < 0.0:
-            raise InputError("diameter", diameter, "one that leaves the corner on its own side of the axis")
+            raise InputError("diameter", f"{1e3 * diameter:g} mm", "one that leaves the corner on its own side of the axis")
         touch = float(np.arccos((height - corner_radius) / between))
         start = [Arc(inner, corner_radius, corner_radius, 0.0, touch)] if corner_radius > 0.0 else []
-        return cls((*_floor(inner), *start, Arc(centre, height, big, touch, float(np.arccos((height - length) / big)))))
+        return cls((*_floor(inner), *start, *_flank(centre, height, big, touch, length, upper_radius)))
 
     @classmethod
     def lens(cls, diameter: float, profile_radius: float, corner_radius: float, length: float | None = None) -> Profile:
@@ -259,7 +263,7 @@ class Profile(Shown):
         r, big = 0.5 * positive("diameter", diameter, "m"), positive("profile_radius", profile_radius, "m")
         _corner(corner_radius, r)
         if not r < big:
-            raise InputError("profile_radius", big, f"above half of the diameter, {r:g} m")
+            raise InputError("profile_radius", f"{1e3 * big:g} mm", f"above half of the diameter, {1e3 * r:g} mm")
         touch = float(np.arcsin((r - corner_radius) / (big - corner_radius)))
         floor = Arc(0.0, big, big, 0.0, touch)
         centre = big - (big - corner_radius) * np.cos(touch)
@@ -272,30 +276,52 @@ class Profile(Shown):
         """Return the outline of an oval: an arc that touches a ball about the axis and is widest where it stands upright."""
         r, big, ball = 0.5 * positive("diameter", diameter, "m"), profile_radius, positive("tip_radius", tip_radius, "m")
         if not ball < r < big:
-            raise InputError("tip_radius and profile_radius", (ball, big), f"a tip below and a profile above half of the diameter, {r:g} m")
+            found, allowed = f"{1e3 * ball:g} and {1e3 * big:g} mm", f"a tip below and a profile above half of the diameter, {1e3 * r:g} mm"
+            raise InputError("tip_radius and profile_radius", found, allowed)
         high = ball + float(np.sqrt((big - ball) ** 2 - (big - r) ** 2))
         touch = float(np.arccos((high - ball) / (big - ball)))
-        if not ball * (1.0 - np.cos(touch)) < length < high + big:
-            raise InputError("length", length, f"above the tip's arc and below {high + big:g} m, where the arc closes")
-        return cls((Arc(0.0, ball, ball, 0.0, touch), Arc(r - big, high, big, touch, float(np.arccos((high - length) / big)))))
+        return cls((Arc(0.0, ball, ball, 0.0, touch), *_flank(r - big, high, big, touch, length, 0.0)))
 
     @classmethod
-    def taper_barrel(cls, profile_radius: float, tip_radius: float, taper: float, height: float, length: float) -> Profile:
-        """Return the outline of a tapered barrel: an arc that touches a ball about the axis and leans by `taper` at a height."""
+    def taper_barrel(
+        cls,
+        profile_radius: float,
+        tip_radius: float,
+        taper: float,
+        height: float,
+        length: float,
+        tip_diameter: float | None = None,
+        upper_radius: float = 0.0,
+    ) -> Profile:
+        """Return the outline of a tapered barrel: an arc that touches the tip's and leans by `taper` at a height.
+
+        Parameters
+        ----------
+        profile_radius, tip_radius : float [m]
+            Of the arcs of flank and tip.
+        taper : float [rad]
+        height, length : float [m]
+            Where the flank leans so, and where the edge ends.
+        tip_diameter : float or None [m]
+            Twice the radius of the tip's arc, were it to go on to a wall; None is a ball.
+        upper_radius : float [m]
+            Of the arc between the flank and the edge's upper end; without it the edge ends sharp.
+        """
         big, ball = positive("profile_radius", profile_radius, "m"), positive("tip_radius", tip_radius, "m")
         if not ball < big:
-            raise InputError("tip_radius", ball, f"below the profile's radius, {big:g} m")
+            raise InputError("tip_radius", f"{1e3 * ball:g} mm", f"below the profile's radius, {1e3 * big:g} mm")
         if not 0.0 <= taper < 0.5 * np.pi:
-            raise InputError("taper", taper, "an angle from 0 to less than a right one [rad]")
+            raise InputError("taper", f"{np.degrees(taper):g} degrees", "an angle from 0 to less than 90 degrees")
+        inner = 0.0 if tip_diameter is None else 0.5 * tip_diameter - ball
+        if inner < -ROUNDING:
+            raise InputError("tip_diameter", f"{2e3 * (inner + ball):g} mm", f"at least twice the radius of its arc, {2e3 * ball:g} mm")
         centre = height + big * np.sin(taper)
         if not abs(centre - ball) < big - ball:
-            raise InputError("height", height, "one at which the arc touches the tip's ball")
+            raise InputError("height", f"{1e3 * height:g} mm", "one at which the arc touches that of the tip")
         touch = float(np.arccos((centre - ball) / (big - ball)))
-        if not ball * (1.0 - np.cos(touch)) < length < centre + big:
-            raise InputError("length", length, f"above the tip's arc and below {centre + big:g} m, where the arc closes")
-        end = float(np.arccos((centre - length) / big))
-        across = -float(np.sqrt((big - ball) ** 2 - (centre - ball) ** 2))
-        return cls((Arc(0.0, ball, ball, 0.0, touch), Arc(across, centre, big, touch, end)))
+        across = max(inner, 0.0) - float(np.sqrt((big - ball) ** 2 - (centre - ball) ** 2))
+        flank = _flank(across, centre, big, touch, length, upper_radius)
+        return cls((*_floor(max(inner, 0.0)), Arc(max(inner, 0.0), ball, ball, 0.0, touch), *flank))
 
     @classmethod
     def seven(cls, d: float, r: float, r_r: float, r_z: float, alpha: float, beta: float, h: float) -> Profile:
@@ -327,13 +353,28 @@ class Profile(Shown):
         return cls(tuple(Line(*map(float, (*a, *b))) for a, b in pairwise(points)))
 
 
+def _flank(r_c: float, z_c: float, big: float, touch: float, length: float, upper: float) -> tuple[Arc, ...]:
+    """A long arc from where it touches the one below it up to the edge's end, there with an arc that meets the end's plane."""
+    start = z_c - big * np.cos(touch)
+    if not start < length < z_c + big:
+        allowed = f"above {1e3 * max(start, 0.0):.6g} mm, where the long arc begins, and below {1e3 * (z_c + big):g} mm, where it closes"
+        raise InputError("length", f"{1e3 * length:g} mm", allowed)
+    if not upper:
+        return (Arc(r_c, z_c, big, touch, float(np.arccos((z_c - length) / big))),)
+    over = length - upper - z_c
+    meet = float(np.arccos(-over / (big - upper))) if 0.0 < upper < big and abs(over) < big - upper else 0.0
+    if not meet > touch:
+        raise InputError("upper_radius", f"{1e3 * upper:g} mm", "a radius whose arc touches the long one below the edge's end")
+    return Arc(r_c, z_c, big, touch, meet), Arc(r_c + (big - upper) * np.sin(meet), length - upper, upper, meet, float(np.pi))
+
+
 def _length(diameter: float, length: float | None) -> float:
     return _LONG * diameter if length is None else positive("length", length, "m")
 
 
 def _corner(corner_radius: float, r: float) -> None:
     if not 0.0 <= corner_radius <= r * (1.0 + ROUNDING):
-        raise InputError("corner_radius", corner_radius, f"0 to half of the diameter, {r:g} m")
+        raise InputError("corner_radius", f"{1e3 * corner_radius:g} mm", f"0 to half of the diameter, {1e3 * r:g} mm")
 
 
 def _floor(r: float) -> tuple[Line, ...]:

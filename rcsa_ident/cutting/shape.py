@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 
 from rcsa_ident.remarks import Remark
@@ -54,7 +55,7 @@ _OF_LIMITS = {
 }
 
 
-def cylinder_remark(shape: CutterShape, forces: bool = False) -> Remark:
+def cylinder_remark(shape: CutterShape, forces: bool = False, missing: Sequence[str] = ()) -> Remark:
     """Return what to make of an answer that took a cutter of this shape for a cylinder of its diameter.
 
     Parameters
@@ -63,9 +64,12 @@ def cylinder_remark(shape: CutterShape, forces: bool = False) -> Remark:
         The range is that of this shape; a cylinder with a noticeable corner radius has that of a bull nose.
     forces : bool
         Whether the answer was found from cutting forces.
+    missing : sequence of str
+        Keys of the cutter that nobody told, without which its shape cannot be drawn.
     """
     known = _OF_LIMITS.get(CutterShape.BULL_NOSE if shape is CutterShape.FLAT else shape)
     what = "the corner radius is more than a tenth of the depth" if shape is CutterShape.FLAT else f"the cutter's shape is {shape}"
+    what += f"; {' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not told" if missing else ""
     limits = (
         "how far its stability limits are off is not known, they may be too high"
         if known is None

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.conditions import AnyEngagement
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.setups import feed_angle_of, read_tooling
+from rcsa_ident.io.cuts import ENGAGEMENT_KEYS, engagement_of, feed_angle_of
+from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.tested_cuts import read_tested_cuts
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
@@ -17,10 +16,7 @@ from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.plausibility import FEED_PER_TOOTH
 from rcsa_ident.stability.tested_cuts import TestedCuts
 
-_CASE = (
-    "name", "tooling", "feed_direction", "radial_depth_mm", "strategy", "entry_angle_deg", "exit_angle_deg", "feed_per_tooth_mm", "tests",
-    "idle",
-)  # fmt: skip
+_CASE = ("name", "tooling", "feed_direction", *ENGAGEMENT_KEYS, "feed_per_tooth_mm", "tests", "idle")
 
 
 class Case(NamedTuple):
@@ -30,7 +26,7 @@ class Case(NamedTuple):
     ----------
     name : str
     tooling : Tooling
-    engagement : Engagement
+    engagement : Engagement, Block, Stepover or EngagementMap
     feed_angle : float [rad]
     feed_per_tooth : float or None [m]
     cuts : TestedCuts or None
@@ -40,7 +36,7 @@ class Case(NamedTuple):
 
     name: str
     tooling: Tooling
-    engagement: Engagement
+    engagement: AnyEngagement
     feed_angle: float
     feed_per_tooth: float | None
     cuts: TestedCuts | None
@@ -68,7 +64,7 @@ def _case(table: Table, folder: Path, number: int) -> Case:
     return Case(
         table.text("name", f"case {number}"),
         tooling,
-        _engagement(table, tooling.cutter.diameter),
+        engagement_of(table, tooling.cutter, lambda own, key: folder / own.text(key)),
         feed_angle_of(table) if "feed_direction" in table else 0.0,
         None if feed is None else feed * 1e-3,
         read_tested_cuts(folder / table.text("tests")) if "tests" in table else None,
@@ -76,26 +72,9 @@ def _case(table: Table, folder: Path, number: int) -> Case:
     )
 
 
-def _engagement(table: Table, diameter: float) -> Engagement:
-    """Both angles, or a radial depth and a strategy; a slot needs no strategy."""
-    if "radial_depth_mm" not in table:
-        entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
-        exit_ = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
-        if exit_ <= entry:
-            table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g} [deg]")
-        return Engagement(float(np.radians(entry)), float(np.radians(exit_)))
-    for key in ("entry_angle_deg", "exit_angle_deg"):
-        if key in table:
-            table.refuse(key, "given beside radial_depth_mm", "the radial depth, or both angles")
-    share = table.number("radial_depth_mm", "mm", above=0.0, most=diameter * 1e3 * (1.0 + 1e-9)) * 1e-3 / diameter
-    slot = share > 1.0 - 1e-9
-    strategy = table.text("strategy", choices=("up", "down")) if "strategy" in table or not slot else "up"
-    return Engagement.from_immersion(min(share, 1.0), strategy)
-
-
 def _beside(text: str, folder: Path) -> str:
     axes, sign, name = text.partition("=")
-    if sign and axes.upper() in ("X", "Y", "XX", "YY", "XY", "YX"):
+    if sign and 1 <= len(axes) <= 2 and set(axes.upper()) <= set("XYZ"):
         return f"{axes}={folder / name}"
     if not text.strip():
         raise InputError("idle", "an empty text", "X=FILE, Y=FILE or FILE")

@@ -21,7 +21,7 @@ from rcsa_ident.io.validated_table import listed
 from rcsa_ident.machine.known_tip import measured_tip
 from rcsa_ident.units import to_hz
 
-AXES = ("X", "Y")
+AXES = ("X", "Y", "Z")
 FREQUENCY = "frequency_hz"
 LOBES = ("spindle_speed_rpm", "limit_depth_mm", "chatter_frequency_hz", "lobe")
 
@@ -66,7 +66,7 @@ class LobeCurves(NamedTuple):
 def write_frf_csv(
     path: str | Path, frequency_hz: ArrayLike, values: Mapping[str, ArrayLike], bands: Mapping[str, ArrayLike] | None = None
 ) -> None:
-    """Write tip receptances [m/N] of axes X, Y or both; numbers read back exactly.
+    """Write tip receptances [m/N] of axes X, Y and Z, or some of them; numbers read back exactly.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def write_frf_csv(
     """
     where = str(path)
     if not values or any(axis not in AXES for axis in values):
-        raise InputError("axes", ", ".join(values) or "none", "X, Y or both", where)
+        raise InputError("axes", ", ".join(values) or "none", "X, Y, Z or several of them", where)
     columns = {FREQUENCY: np.asarray(frequency_hz, dtype=float)}
     for axis in AXES:
         if axis in values:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import permutations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.curves import FREQUENCY, read_frf_csv
+from rcsa_ident.io.curves import AXES, FREQUENCY, read_frf_csv
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.uff import (
     ACCELERATION,
@@ -55,7 +56,7 @@ class TapTest(NamedTuple):
     frequency : array, shape (n,) [Hz]
     values : complex array, shape (n,) [m/N]
     response, force : str
-        Axis X or Y (Z, or empty, where the file says so).
+        Axis X, Y or Z (empty where the file says none).
     record : int
         Number in the file, from 1.
     point : str
@@ -171,13 +172,14 @@ def _wanted(tests: list[TapTest], source: Source) -> dict[tuple[str, str], TapTe
         tests = [test for test in tests if test.record == source.record]
         if not tests:
             raise InputError("frf", f"record {source.record}", "the number of an FRF in the file, counted from 1", path)
-    named = [test for test in tests if test.response in ("X", "Y") and test.force in ("X", "Y")]
+    named = [test for test in tests if test.response in AXES and test.force in AXES]
     if source.pair is None:
         if not named:
             raise InputError("frf", "a file that names no axis", "a file given with the axes of its response and force", path)
-        return {
-            pair: _only([t for t in named if (t.response, t.force) == pair], pair, path) for pair in {(t.response, t.force) for t in named}
-        }
+        pairs = {(test.response, test.force) for test in named}
+        # what a triaxial sensor felt of Z says nothing where nobody pushed there
+        kept = pairs if ("Z", "Z") in pairs else {pair for pair in pairs if "Z" not in pair}
+        return {pair: _only([t for t in named if (t.response, t.force) == pair], pair, path) for pair in kept}
     own = [test for test in named if (test.response, test.force) == source.pair]
     # a file that names no axes holds the one that was asked for
     silent = [test for test in tests if not test.response and not test.force]
@@ -205,7 +207,7 @@ def _from_csv(path: str | Path) -> list[TapTest]:
         TapTest(curves.frequency, values, axis, axis, i, "tip / tip", str(path))
         for i, (axis, values) in enumerate(curves.values.items(), 1)
     ]
-    for response, force in (("X", "Y"), ("Y", "X")):
+    for response, force in permutations(AXES, 2):
         parts = [curves.bands.get(f"{response}{force}_{part}") for part in ("re", "im")]
         if parts[0] is not None and parts[1] is not None:
             values = parts[0] + 1j * parts[1]

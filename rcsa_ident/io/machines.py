@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.io.setups import beam_segments, feed_angle_of, material_library
+from rcsa_ident.io.cuts import feed_angle_of
+from rcsa_ident.io.setups import beam_segments, material_library
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of

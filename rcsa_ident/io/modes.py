@@ -20,7 +20,7 @@ from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.uncertain_tip import UncertainTip
 from rcsa_ident.units import from_hz, from_rpm, to_hz
 
-_TOP = ("x", "y", "coefficients", "softening_sd_percent_per_1000_rpm")
+_TOP = ("x", "y", "z", "coefficients", "softening_sd_percent_per_1000_rpm")
 #: Values of a mode, each with the key of its standard deviation and its unit; of the last two a mode has one.
 _VALUES = {
     "natural_frequency_hz": ("natural_frequency_sd_hz", "Hz"),
@@ -42,10 +42,10 @@ class ModesFile:
     Parameters
     ----------
     models : mapping of Dof to ModalModel
-        At ``tip.x`` and ``tip.y``; a direction without tables is rigid and missing here.
+        At ``tip.x``, ``tip.y`` and ``tip.z``; a direction without tables is rigid and missing here.
     spreads : array, shape (3, m)
-        Standard deviations of natural frequencies, damping ratios and stiffnesses (or masses) over the values, X before Y; NaN where
-        the file tells none.
+        Standard deviations of natural frequencies, damping ratios and stiffnesses (or masses) over the values, X before Y before Z;
+        NaN where the file tells none.
     coefficients : CuttingCoefficients or None
     coefficient_spreads : (float, float)
         Standard deviations of K_tc and K_rc over the values, NaN where the file tells none.
@@ -93,7 +93,7 @@ class ModesFile:
 
 
 def read_modes(path: str | Path) -> Mapping[Dof, ModalModel]:
-    """Return the modes of each direction at ``tip.x`` or ``tip.y``; a direction without tables is rigid and missing here.
+    """Return the modes of each direction at ``tip.x``, ``tip.y`` or ``tip.z``; a direction without tables is rigid and missing here.
 
     Raises
     ------
@@ -112,12 +112,12 @@ def modes_of(data: Mapping[str, Any], where: str) -> ModesFile:
     """Return what a table of keys holds as `read_modes_file` finds it in a file; `where` is the file, for the messages."""
     top = Table(data, where, known=_TOP)
     models, spreads, missing = {}, [np.zeros((3, 0))], list[str]()
-    for axis in (Dof.X, Dof.Y):
+    for axis in (Dof.X, Dof.Y, Dof.Z):
         if axis in top:
             models[axis], own = _model(top.tables(axis, _MODE), axis, missing)
             spreads.append(own)
     if not models:
-        top.refuse("x", "nothing", "tables [[x]], [[y]] or both")
+        top.refuse("x", "nothing", "tables [[x]], [[y]], [[z]] or several of them")
     coefficients, shares = (
         _coefficients(top.table("coefficients", _COEFFICIENTS), missing) if "coefficients" in top else (None, (np.nan, np.nan))
     )

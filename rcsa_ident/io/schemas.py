@@ -36,7 +36,11 @@ _HOLDER: dict[str, Any] = {
     "insertion_mm": 40.0,
     "segments": [{"length_mm": 40.0, "outer_diameter_mm": 50.0, "inner_diameter_mm": 14.0, "material": "steel"}],
 }
-_CUTTER = {"teeth": 4, "diameter_mm": 12.0, "helix_deg": 30.0, "pitch_deg": [90.0] * 4, "shape": "bull-nose", "corner_radius_mm": 1.0}
+_CUTTER = {
+    "teeth": 4, "diameter_mm": 12.0, "helix_deg": 30.0, "pitch_deg": [90.0] * 4, "shape": "bull-nose", "corner_radius_mm": 1.0,
+    "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5, "shape": "table", "shift": [0.0] * 4, "table": [0.0, 1.0, -1.0]},
+    "runout_mm": [0.0] * 4, "axial_runout_mm": [0.0] * 4,
+}  # fmt: skip
 _STIFF = {"translational_stiffness": 2e10, "rotational_stiffness": 6e5, "translational_damping": 6e4, "rotational_damping": 9.0}
 _PLAIN: dict[str, Any] = {
     "name": "plain",
@@ -46,7 +50,8 @@ _PLAIN: dict[str, Any] = {
 }
 _TOOLINGS = (
     _PLAIN,
-    _PLAIN | {"cutter": {"teeth": 2, "diameter_mm": 12.0, "pitch_deg": [180.0, 180.0]}},
+    _PLAIN
+    | {"cutter": {"teeth": 2, "diameter_mm": 12.0, "pitch_deg": [180.0, 180.0], "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5}}},
     {
         "name": "all",
         "cutter": _CUTTER,
@@ -62,7 +67,13 @@ _WORKPIECE = {
     "tangential_coefficient_mpa": 900.0,
     "radial_ratio": 0.3,
 }
-_ANGLES = {"axial_depth_mm": 0.4, "feed_per_tooth_mm": 0.1, "entry_angle_deg": 90.0, "exit_angle_deg": 180.0, "feed_direction": "+X"}
+_FEED = {"axial_depth_mm": 0.4, "feed_per_tooth_mm": 0.1, "feed_direction": "+X"}
+_ANGLES = {**_FEED, "entry_angle_deg": 90.0, "exit_angle_deg": 180.0}
+_STOCKS: tuple[dict[str, Any], ...] = (
+    {"stock": "stepover", "radial_depth_mm": 3.0, "strategy": "down"},
+    {"stock": "block", "y_from_mm": -6.0, "y_to_mm": 2.0},
+    {"engagement": [[0.0, 90.0, 180.0], [1.0, 90.0, 180.0]], "lead_deg": 5.0, "tilt_deg": 5.0},
+)
 _CAMPAIGNS = (
     {
         "sensors": {
@@ -73,7 +84,13 @@ _CAMPAIGNS = (
         },
         "workpiece": _WORKPIECE,
         "toolings": {"S1": "toolings/S1.toml"},
-        "cuts": [{"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, **_ANGLES, "cut": "recordings/1.h5", "air": "recordings/a.h5"}],
+        "cuts": [
+            {"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, **_ANGLES, "cut": "recordings/1.h5", "air": "recordings/a.h5"},
+            *(
+                {"id": f"{2 + k}", "tooling": "S1", "spindle_speed_rpm": 8000.0, **_FEED, **stock, "cut": f"recordings/{2 + k}.h5"}
+                for k, stock in enumerate(_STOCKS)
+            ),
+        ],
     },
     {
         "campaign": {"name": "without air", "sampling_rate_hz": 51200.0},
@@ -141,7 +158,10 @@ _MACHINES = (
 )
 _MODE = {"natural_frequency_hz": 500.0, "damping_ratio": 0.03}
 _MODES = (
-    {"x": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}]},
+    {
+        "x": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}],
+        "z": [_MODE | {"modal_mass_kg": 1.0}, _MODE | {"stiffness_n_per_m": 1e7}],
+    },
     {
         "y": [
             _MODE | {"modal_mass_kg": 1.0, "modal_mass_sd_kg": 0.1, "natural_frequency_sd_hz": 5.0, "damping_ratio_sd": 0.01},

@@ -3,34 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, same_everywhere
-from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.cuts import CUT_KEYS, cut_of
+from rcsa_ident.io.cutters import CUTTER_KEYS, cutter_of
 from rcsa_ident.io.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
-from rcsa_ident.machining_setup import BareCutter, Campaign, Cut, Tooling
+from rcsa_ident.machining_setup import BareCutter, Campaign, Tooling
 from rcsa_ident.plausibility import (
-    AXIAL_DEPTH,
     CONTACT,
     DENSITY,
-    DIAMETER,
-    FEED_PER_TOOTH,
-    LARGEST_SWEEP,
-    LEAST_SWEEP,
     LOSS_FACTOR,
     MODULUS,
     SEGMENT_DIAMETER,
-    SPINDLE_SPEED,
     STICKOUT,
 )
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
@@ -38,13 +30,10 @@ from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Se
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, behind, clamped
 from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, Spread
 from rcsa_ident.tool_holder.taper import tapers
-from rcsa_ident.units import from_rpm, to_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
-FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials", "spread")
-_CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg", "shape", "corner_radius_mm")
 _SEGMENT = (
     "length_mm",
     "outer_diameter_mm",
@@ -76,19 +65,6 @@ _SENSOR = (
     "delay_spread_us",
 )
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
-_CUT = (
-    "id",
-    "tooling",
-    "spindle_speed_rpm",
-    "spindle_speed_to_rpm",
-    "axial_depth_mm",
-    "feed_per_tooth_mm",
-    "entry_angle_deg",
-    "exit_angle_deg",
-    "feed_direction",
-    "cut",
-    "air",
-)
 
 
 def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
@@ -108,7 +84,7 @@ def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
     data = read_toml(path, "tooling")
     if tip_known and "tool" not in data and "holder" not in data:
         top = Table(data, str(path), known=_TOOLING)
-        return BareCutter(top.text("name", Path(path).stem), _cutter(top.table("cutter", _CUTTER)))
+        return BareCutter(top.text("name", Path(path).stem), cutter_of(top.table("cutter", CUTTER_KEYS)))
     return tooling_of(data, str(path), Path(path).stem)
 
 
@@ -129,7 +105,7 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     tool = top.table("tool", ("stickout_mm", "segments", "model"))
     holder = top.table("holder", ("insertion_mm", "segments", "model", "taper"))
     name = top.text("name", name)
-    cutter = _cutter(top.table("cutter", _CUTTER))
+    cutter = cutter_of(top.table("cutter", CUTTER_KEYS))
     pieces = beam_segments(tool, materials)
     stickout = tool.quantity("stickout_mm", STICKOUT) * 1e-3
     insertion = holder.number("insertion_mm", "mm", least=0.0, most=5000.0) * 1e-3
@@ -172,24 +148,6 @@ def material_library(top: Table) -> dict[str, Material]:
         loss = table.quantity("loss_factor", LOSS_FACTOR, base.loss_factor if base else 0.0)
         materials[name] = Material(modulus * 1e9, density, poisson, loss)
     return materials
-
-
-def _cutter(table: Table) -> Cutter:
-    teeth = table.number("teeth", least=1, most=100, whole=True)
-    diameter = table.quantity("diameter_mm", DIAMETER) * 1e-3
-    helix = float(np.radians(table.number("helix_deg", "deg", 0.0, least=0.0, most=80.0)))
-    shape = CutterShape(table.text("shape", CutterShape.FLAT, choices=tuple(CutterShape)))
-    corner = table.number("corner_radius_mm", "mm", 0.0, least=0.0, most=1000.0) * 1e-3
-    if not shape.has_room(corner, diameter):
-        table.refuse("corner_radius_mm", f"{1e3 * corner:g}", f"at most half of the diameter, {500.0 * diameter:g} [mm]")
-    plain = Cutter(teeth, diameter, helix, shape=shape, corner_radius=corner)
-    if "pitch_deg" not in table:
-        return plain
-    degrees = np.array(table.numbers("pitch_deg", teeth, "deg"))
-    if np.any(degrees <= 0.0) or abs(degrees.sum() - 360.0) > 0.01 * teeth:
-        table.refuse("pitch_deg", f"{degrees.tolist()}, sum {degrees.sum():g}", f"{teeth} angles above 0 that add up to 360 [deg]")
-    # angles written with few decimals add up to nearly a turn
-    return replace(plain, pitch=degrees * (2.0 * np.pi / degrees.sum()))
 
 
 def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamSegment, ...]:
@@ -305,7 +263,7 @@ def campaign_of(
     toolings = {key: tooling(named, key) for key in named}
     if "cuts" not in top and not alone:
         top.refuse("cuts", "nothing", "tables [[cuts]], hammer tests [[frfs]], or both")
-    cuts = tuple(_cut(table, toolings, locate) for table in top.tables("cuts", _CUT)) if "cuts" in top else ()
+    cuts = tuple(cut_of(table, toolings, locate) for table in top.tables("cuts", CUT_KEYS)) if "cuts" in top else ()
     tests = tuple(hammer_test_of(table, toolings, locate) for table in top.tables("frfs", HAMMER_TEST_KEYS)) if "frfs" in top else ()
     seen: dict[str, str] = {}
     for place, id in [*((f"cuts[{i}]", cut.id) for i, cut in enumerate(cuts)), *((f"frfs[{i}]", test.id) for i, test in enumerate(tests))]:
@@ -369,71 +327,6 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         table.number("cross_talk_percent", "%", 1.5, least=0.0, most=50.0) * 1e-2,
         table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) / 1e6,
     )
-
-
-def _cut(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table, str], Path]) -> Cut:
-    entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
-    exit_ = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
-    if exit_ <= entry:
-        table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
-    conditions = CuttingConditions(
-        from_rpm(table.quantity("spindle_speed_rpm", SPINDLE_SPEED)),
-        table.quantity("axial_depth_mm", AXIAL_DEPTH) * 1e-3,
-        table.quantity("feed_per_tooth_mm", FEED_PER_TOOTH) * 1e-3,
-        Engagement(float(np.radians(entry)), float(np.radians(exit_))),
-        feed_angle_of(table),
-    )
-    name = table.text("id")
-    tooling = table.text("tooling", choices=tuple(toolings), names_of="toolings")
-    air = locate(table, "air") if "air" in table else None
-    return Cut(name, tooling, conditions, locate(table, "cut"), air, _last_speed(table, conditions.spindle_speed))
-
-
-def _last_speed(table: Table, first: float) -> float | None:
-    """At which a pass ends whose speed changes, [rad/s]."""
-    if "spindle_speed_to_rpm" not in table:
-        return None
-    last = from_rpm(table.quantity("spindle_speed_to_rpm", SPINDLE_SPEED))
-    if not LEAST_SWEEP <= abs(last / first - 1.0) <= LARGEST_SWEEP:
-        allowed = f"{100 * LEAST_SWEEP:g} % to {100 * LARGEST_SWEEP:g} % beside spindle_speed_rpm, {to_rpm(first):g}"
-        table.refuse("spindle_speed_to_rpm", f"{to_rpm(last):g}", f"{allowed}; without it the cut keeps its speed")
-    return last
-
-
-def feed_angle_of(table: Table) -> float:
-    value = table.number_or("feed_direction", FEED_DIRECTIONS, "an angle from +X", "deg", -360.0, 360.0)
-    return FEED_DIRECTIONS[value] if isinstance(value, str) else float(np.radians(value))
-
-
-def feed_direction_of(angle: float) -> str | float:
-    """Return what ``feed_direction`` says of an angle [rad]: an axis, or degrees from +X."""
-    return next((axis for axis, known in FEED_DIRECTIONS.items() if abs(angle - known) < 1e-12), float(np.degrees(angle)))
-
-
-def cut_keys(name: str, tooling: str, conditions: CuttingConditions, last_speed: float | None = None) -> dict[str, Any]:
-    """Return an entry of ``[[cuts]]``; its recordings are named after it.
-
-    Parameters
-    ----------
-    name, tooling : str
-    conditions : CuttingConditions
-    last_speed : float or None [rad/s]
-        Of a pass whose speed changes.
-    """
-    entry, leave = same_everywhere(conditions.engagement).angles
-    return {
-        "id": name,
-        "tooling": tooling,
-        "spindle_speed_rpm": to_rpm(conditions.spindle_speed),
-        **({} if last_speed is None else {"spindle_speed_to_rpm": to_rpm(last_speed)}),
-        "axial_depth_mm": conditions.axial_depth * 1e3,
-        "feed_per_tooth_mm": conditions.feed_per_tooth * 1e3,
-        "entry_angle_deg": float(np.degrees(entry)),
-        "exit_angle_deg": float(np.degrees(leave)),
-        "feed_direction": feed_direction_of(conditions.feed_angle),
-        "cut": f"recordings/{name}_cut.h5",
-        "air": f"recordings/{name}_air.h5",
-    }
 
 
 def _inside(folder: Path, table: Table, key: str) -> Path:

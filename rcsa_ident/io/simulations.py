@@ -13,10 +13,10 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.cuts import cut_keys
 from rcsa_ident.io.files import filling, write_text
 from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.machines import MachineFile
-from rcsa_ident.io.setups import cut_keys
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling

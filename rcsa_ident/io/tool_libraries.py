@@ -1,5 +1,7 @@
 """Tool libraries of Fusion 360 and HSM: plain JSON, or that JSON in a zip container (.tools), become toolings.
 
+An entry may also hold the properties of ISO 13399 by their names, as makers print them: DC, RE, KAPR, APMX, ZEFP and so on.
+
 A library knows the shape of cutter and holder. What it cannot know is said in the tooling's own notes: how the fluted part
 bends, how deep the tool sits, what holds it. Segments of a holder run from the tool's side to the spindle's, as a tooling's do.
 """
@@ -16,9 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-from rcsa_ident.cutting.shape import CutterShape, cylinder_remark
+from rcsa_ident.cutting.outlines import key_of, missing
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.library_shapes import NotRead, check_type, iso_geometry, iso_shape_keys, shape_keys
 from rcsa_ident.io.setups import tooling_of
 from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.io.toolings import tooling_text
@@ -35,25 +39,6 @@ UNITS = {"millimeters": 1.0, "inches": 25.4}
 _ROUNDING = 0.05
 _HOLDER = "holder"
 _CARBIDE, _STEEL = "carbide", "steel"
-#: Shapes by the names of libraries; a milling tool that has another name keeps it in a note.
-_SHAPES = {
-    "flat end mill": CutterShape.FLAT,
-    "rough end mill": CutterShape.FLAT,
-    "slot mill": CutterShape.FLAT,
-    "bull nose end mill": CutterShape.BULL_NOSE,
-    "ball end mill": CutterShape.BALL,
-    "tapered mill": CutterShape.TAPERED,
-    "face mill": CutterShape.FACE,
-    "radius mill": CutterShape.RADIUS,
-    "circle segment barrel": CutterShape.BARREL,
-    "circle segment lens": CutterShape.LENS,
-    "circle segment oval": CutterShape.OVAL,
-    "circle segment taper": CutterShape.TAPER_BARREL,
-    "lollipop mill": CutterShape.LOLLIPOP,
-    "chamfer mill": CutterShape.CHAMFER,
-    "dovetail mill": CutterShape.DOVETAIL,
-    "form mill": CutterShape.PROFILE,
-}
 _BODIES = {"carbide": _CARBIDE, "hss": _STEEL, "hssco": _STEEL}
 
 
@@ -155,9 +140,10 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None,
     if (
         not isinstance(entries, list)
         or not entries
-        or not any(isinstance(e, Mapping) and ("geometry" in e or "segments" in e) for e in entries)
+        or not any(isinstance(e, Mapping) and e.keys() & {"geometry", "segments", "DC"} for e in entries)
     ):
-        raise InputError("tool library", "no list of tools", "a list 'data' of tools with 'geometry' and 'holder'", where)
+        allowed = "a list 'data' of tools with 'geometry' and 'holder', or with properties of ISO 13399"
+        raise InputError("tool library", "no list of tools", allowed, where)
     if len(entries) > most:
         raise InputError("tool library", f"{len(entries)} entries", f"at most {most}", where)
     spare = None
@@ -179,13 +165,22 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None,
             data, notes = _tooling(Table(entry, where, place), name, given, spare)
             text = tooling_text(data, notes)
             tooling = tooling_of(keys_of_toml(text, "tooling", where), where, name)
+            _check_drawn(tooling)
             found.append(Imported(number, name, kind, tooling, text, tuple(notes), ""))
-        except _Skipped as skipped:
+        except NotRead as skipped:
             found.append(Imported(number, name, kind, None, "", (), str(skipped)))
         except InputError as error:
             reason = _line(f"{error.field}: found {error.found}, allowed is {error.allowed}", 400)
             found.append(Imported(number, name, kind, None, "", (), reason))
     return found
+
+
+def _check_drawn(tooling: Tooling) -> None:
+    """Refuse a shape that would be computed as a cylinder."""
+    cutter = tooling.cutter
+    if cutter.profile is None and cutter.shape is not CutterShape.FLAT:
+        lacking = ", ".join(key_of(name) for name in missing(cutter.shape, cutter.corner_radius, cutter.dimensions))
+        raise NotRead(f"a cutter of the shape {cutter.shape} of which {lacking or 'too little'} is not told")
 
 
 def file_names(names: Sequence[str]) -> list[str]:
@@ -201,10 +196,6 @@ def file_names(names: Sequence[str]) -> list[str]:
         taken.add(free.lower())
         found.append(f"{free}.toml")
     return found
-
-
-class _Skipped(Exception):
-    """An entry is not a milling tool in a holder."""
 
 
 def _content(raw: bytes, where: str) -> Any:
@@ -265,18 +256,16 @@ def _name(entry: Mapping[str, Any]) -> str:
 
 def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, Any] | None) -> tuple[dict[str, Any], list[str]]:
     """Keys of a tooling file, lengths in millimetres, and what was assumed."""
-    kind = _line(entry.data.get("type", ""))
-    if kind not in _SHAPES and ("mill" not in kind or "thread" in kind):
-        raise _Skipped(f"a {kind}, not a milling tool" if kind else "an entry without a type")
     notes: list[str] = []
     scale = _unit(entry, notes)
-    geometry = entry.table("geometry")
+    geometry, shape = _geometry(entry, scale, notes)
     diameter = geometry.number("DC", "", above=0.0) * scale
     teeth = geometry.number("NOF", least=1, most=100, whole=True)
     helix = geometry.number("FHA", "deg", None, least=0.0, most=80.0)
     if helix is None:
-        helix = given.helix_deg
-        notes.append(f"helix angle {helix:g}° assumed: none in the library")
+        inserts = shape.get("shape") in (CutterShape.FACE, CutterShape.HIGH_FEED)
+        helix = 0.0 if inserts else given.helix_deg
+        notes.append(f"helix angle {helix:g}° assumed{', as of inserts' if inserts else ''}: none in the library")
     material = _body(entry, given, notes)
     segments, shank = _tool_segments(entry, geometry, diameter, scale, given, material, notes)
     stickout, insertion = _lengths(geometry, scale, given, notes)
@@ -286,7 +275,7 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
         holder = _bored(holder, insertion, shank)
     data: dict[str, Any] = {
         "name": name,
-        "cutter": {"teeth": teeth, "diameter_mm": diameter, "helix_deg": helix} | _shape(geometry, kind, scale, notes),
+        "cutter": {"teeth": teeth, "diameter_mm": diameter, "helix_deg": helix} | shape,
         "tool": {"stickout_mm": stickout, "segments": segments},
         "holder": {"insertion_mm": insertion, "segments": holder},
     }
@@ -299,6 +288,17 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
     return data, notes
 
 
+def _geometry(entry: Table, scale: float, notes: list[str]) -> tuple[Table, dict[str, Any]]:
+    """A tool's geometry, and the keys that draw its outline: of a library's entry, or of properties of ISO 13399 by their names."""
+    if "geometry" not in entry and "DC" in entry:
+        geometry = Table(iso_geometry(entry.data), entry.where, entry.path)
+        return geometry, iso_shape_keys(entry.text("shape", None, choices=tuple(CutterShape)), geometry, scale, notes)
+    kind = _line(entry.data.get("type", ""))
+    check_type(kind)
+    geometry = entry.table("geometry")
+    return geometry, shape_keys(kind, geometry, scale, notes)
+
+
 def _unit(table: Table, notes: list[str]) -> float:
     if "unit" not in table:
         notes.append("lengths assumed in millimetres: no unit in the library")
@@ -307,25 +307,6 @@ def _unit(table: Table, notes: list[str]) -> float:
     if unit == "inches":
         notes.append("lengths converted from inches")
     return UNITS[unit]
-
-
-def _shape(geometry: Table, kind: str, scale: float, notes: list[str]) -> dict[str, Any]:
-    """The keys that say what the edges sweep over, where that is not a plain cylinder."""
-    shape = _SHAPES.get(kind, CutterShape.PROFILE)
-    keys: dict[str, Any] = {} if shape is CutterShape.FLAT else {"shape": str(shape)}
-    corner = (geometry.number("RE", "", None, least=0.0) or 0.0) * scale
-    if corner:
-        keys["corner_radius_mm"] = corner
-    if shape is CutterShape.PROFILE:
-        notes.append(f"the library's {kind}: its outline is not read, the shape is kept as {shape}")
-    if kind.startswith("rough"):
-        notes.append(
-            f"the library's {kind} is computed with smooth edges: it says nothing of serrations, for which stability limits were told at "
-            "0.24 to 0.47 times the true ones"
-        )
-    if shape is not CutterShape.FLAT:
-        notes.append(str(cylinder_remark(shape)))
-    return keys
 
 
 def _body(entry: Table, given: Assumptions, notes: list[str]) -> str:
@@ -415,7 +396,7 @@ def _holder_segments(
         table = Table(spare, entry.where, "holder")
         notes.append(f"holder {_name(spare)} of the library")
     else:
-        raise _Skipped("a tool without a holder; name one of the library's")
+        raise NotRead("a tool without a holder; name one of the library's")
     if "unit" in table:
         scale = UNITS[table.text("unit", choices=tuple(UNITS))]
     cones = _stack(table, scale)
@@ -436,7 +417,7 @@ def _holder_segments(
 def _behind(left: float, holder: list[dict[str, Any]], notes: list[str]) -> float:
     """Insertion that the library leaves open: what there is of the tool behind the holder's nose, inside of the holder."""
     if left <= 0.0:
-        raise _Skipped("a tool that ends at the holder's nose (OAL and LB); the insertion has to be given")
+        raise NotRead("a tool that ends at the holder's nose (OAL and LB); the insertion has to be given")
     # a nanometre less than the whole: figures are rounded when they are written
     insertion = min(left, sum(c["length_mm"] for c in holder) - 1e-6)
     notes.append(f"insertion {insertion:.6g} mm assumed: all of the tool behind the holder's nose (OAL and LB); the bore may be shorter")

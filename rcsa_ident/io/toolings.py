@@ -7,9 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from rcsa_ident.cutting.shape import CutterShape
+from rcsa_ident.io.cutters import cutter_keys
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.setups import SPREADS
 from rcsa_ident.io.toml_text import toml_of
@@ -22,13 +20,13 @@ _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_da
 
 
 def write_tooling(path: str | Path, tooling: Tooling) -> None:
-    """Write a tooling's file; run-out belongs to a clamping and is left away."""
+    """Write a tooling's file."""
     write_text(path, tooling_text(tooling_keys(tooling)))
 
 
 def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     """Return a tooling as its file holds it, in the machinist's units."""
-    cutter, assembly = tooling.cutter, tooling.assembly
+    assembly = tooling.assembly
     materials = dict(MATERIALS)
     for segment in (*tooling.whole_tool, *assembly.holder):
         if segment.material not in materials.values():
@@ -36,16 +34,10 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     names = {material: name for name, material in materials.items()}
     data: dict[str, Any] = {
         "name": tooling.name,
-        "cutter": {"teeth": cutter.teeth, "diameter_mm": 1e3 * cutter.diameter, "helix_deg": float(np.degrees(cutter.helix))},
+        "cutter": cutter_keys(tooling.cutter),
         "tool": {"stickout_mm": 1e3 * assembly.stickout, "segments": [_segment(s, names) for s in _joined(tooling)]},
         "holder": {"insertion_mm": 1e3 * assembly.insertion, "segments": [_segment(s, names) for s in assembly.holder]},
     }
-    if np.ptp(cutter.pitch) > 1e-9:
-        data["cutter"]["pitch_deg"] = np.degrees(cutter.pitch).tolist()
-    if cutter.shape is not CutterShape.FLAT:
-        data["cutter"]["shape"] = str(cutter.shape)
-    if cutter.corner_radius:
-        data["cutter"]["corner_radius_mm"] = 1e3 * cutter.corner_radius
     if assembly.contact is not None:
         data["contact"] = contact_keys(assembly.contact)
     for part, model in (("tool", tooling.tool_model), ("holder", tooling.holder_model)):

@@ -105,7 +105,7 @@ def _ends(tip: Receptance) -> FloatArray:
 def measured_tip(
     curves: Mapping[Dof, tuple[FloatArray, ComplexArray]], cross: Mapping[tuple[Dof, Dof], tuple[FloatArray, ComplexArray]] | None = None
 ) -> Receptance:
-    """Return the tip's 2 x 2 receptance of measured FRFs.
+    """Return the tip's receptance of measured FRFs, over X and Y, and over Z where it is there.
 
     Parameters
     ----------
@@ -118,14 +118,14 @@ def measured_tip(
     for axis, (frequency, values) in curves.items():
         tip = (Coordinate("tip", axis),)
         planes[axis] = Receptance(from_hz(frequency), np.asarray(values)[:, None, None], tip, tip)
-    both = uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+    both = _with_axial(planes)
     if not cross:
         return both
-    missing = [axis for axis in (Dof.X, Dof.Y) if axis not in planes]
+    missing = [axis for axis in dict.fromkeys([Dof.X, Dof.Y, *(axis for pair in cross for axis in pair)]) if axis not in planes]
     if missing:
         raise InputError("cross FRF", f"one without an FRF in {missing[0].upper()}", "FRFs in both directions beside it")
     full = both.values.copy()
-    places = {Dof.X: 0, Dof.Y: 1}
+    places = {Dof.X: 0, Dof.Y: 1, Dof.Z: 2}
     for (response, force), (frequency, values) in cross.items():
         if not np.array_equal(from_hz(frequency), both.omega):
             raise InputError("cross FRF", f"{np.size(frequency)} frequencies", f"the {both.omega.size} frequencies of the direct FRFs")
@@ -133,3 +133,19 @@ def measured_tip(
         if (force, response) not in cross:
             full[:, places[force], places[response]] = values
     return Receptance(both.omega, full, both.rows, both.cols)
+
+
+def _with_axial(planes: Mapping[Dof, Receptance]) -> Receptance:
+    """X and Y, rigid where they are missing, and Z behind them where it is there."""
+    axial = planes.get(Dof.Z)
+    if axial is None:
+        return uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+    known = [plane for plane in planes.values() if not np.array_equal(plane.omega, axial.omega)]
+    if known:
+        raise InputError("z receptance", f"{axial.omega.size} frequencies", f"the {known[0].omega.size} frequencies of the others")
+    coordinates = tuple(Coordinate("tip", axis) for axis in (Dof.X, Dof.Y, Dof.Z))
+    full = np.zeros((axial.omega.size, 3, 3), dtype=complex)
+    for k, coordinate in enumerate(coordinates):
+        if coordinate.dof in planes:
+            full[:, k, k] = planes[coordinate.dof].values[:, 0, 0]
+    return Receptance(axial.omega, full, coordinates, coordinates)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from itertools import groupby
+from textwrap import wrap
 
+import numpy as np
+
+from rcsa_ident.cutting.outlines import ANGLES, in_files
+from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.report.edge_detail import edge_detail
 from rcsa_ident.tool_holder.geometry import BeamSegment
 
 #: Drawn on a paper of its own, so that it reads on a light page and on a dark one.
@@ -19,6 +24,7 @@ _STYLE = """
 --contact:#ff7b8a}}
 .rt .paper{fill:var(--paper)}.rt .tool{fill:var(--tool);stroke:var(--ink)}.rt .holder{fill:url(#rt-hatch);stroke:var(--ink)}
 .rt .edge{fill:none;stroke:var(--ink)}.rt .hidden{fill:none;stroke:var(--ink)}.rt .axis,.rt .line{fill:none;stroke:var(--soft)}
+.rt .swept{fill:none;stroke:var(--contact)}.rt .cut{stroke:none}
 .rt .arrow{fill:var(--soft)}.rt .contact{fill:none;stroke:var(--contact)}
 .rt text{fill:var(--ink);font-family:system-ui,sans-serif;paint-order:stroke;
 stroke:var(--paper);stroke-linejoin:round}
@@ -26,6 +32,8 @@ stroke:var(--paper);stroke-linejoin:round}
 """
 #: Width of a character over the size of the letters, a little more than most fonts need.
 _CHARACTER = 0.58
+#: Characters of a line of words.
+_LINE = 84
 
 
 @dataclass(slots=True)
@@ -55,6 +63,12 @@ class _Sheet:
             self.reach(x, y)
         shown = " ".join(f"{_mm(x)},{_mm(y)}" for x, y in points)
         self.parts.append(f'<polygon class="{kind}" points="{shown}" stroke-width="{_mm(0.08 * self.letters)}"{more}/>')
+
+    def polyline(self, kind: str, points: Sequence[tuple[float, float]]) -> None:
+        for x, y in points:
+            self.reach(x, y)
+        shown = " ".join(f"{_mm(x)},{_mm(y)}" for x, y in points)
+        self.parts.append(f'<polyline class="{kind}" points="{shown}" stroke-width="{_mm(0.16 * self.letters)}"/>')
 
     def line(self, kind: str, x1: float, y1: float, x2: float, y2: float, width: float = 0.05, dashes: Sequence[float] = ()) -> None:
         self.reach(x1, y1)
@@ -125,9 +139,11 @@ def tooling_svg(tooling: Tooling, brief: bool = False) -> str:
             sheet.line("edge", end, -bore, end, bore, 0.05)
     for x, segment in tool:
         _draw_tool(sheet, x, segment)
-    first = assembly.tool[0]
-    if tooling.cutter.diameter > max(first.diameter, first.end):
-        radius, end = 500.0 * tooling.cutter.diameter, min(1e3 * first.length, nose)
+    first, cutter = assembly.tool[0], tooling.cutter
+    if cutter.profile is not None:
+        _draw_outline(sheet, cutter.profile, min(first.length, assembly.stickout))
+    elif cutter.diameter > max(first.diameter, first.end):
+        radius, end = 500.0 * cutter.diameter, min(1e3 * first.length, nose)
         outline = [(0.0, -radius), (end, -radius), (end, radius), (0.0, radius)]
         sheet.polygon("hidden", outline, _dashes(sheet, 0.5, 0.4))
     if assembly.contact is not None and assembly.insertion > 0.0:
@@ -139,6 +155,8 @@ def tooling_svg(tooling: Tooling, brief: bool = False) -> str:
         return _page(sheet, tooling, nose, flange, brief)
     _diameters(sheet, tooling, tool, holder, nose)
     _lengths(sheet, tool, holder, nose, tail, flange)
+    if cutter.profile is not None:
+        _detail(sheet, cutter.profile)
     return _page(sheet, tooling, nose, flange, brief)
 
 
@@ -166,6 +184,28 @@ def _draw_tool(sheet: _Sheet, x: float, segment: BeamSegment) -> None:
     if segment.inner_diameter > 0.0:
         for side in (-500.0, 500.0):
             sheet.line("hidden", x, side * segment.inner_diameter, end, side * segment.inner_diameter, 0.08, (0.5, 0.4))
+
+
+def _draw_outline(sheet: _Sheet, profile: Profile, most: float) -> None:
+    """What the edges sweep over, as far as the fluted part goes [m]."""
+    points = 1e3 * profile.outline(most)
+    sheet.polygon("swept", [*((z, -r) for r, z in points.tolist()), *((z, r) for r, z in points[::-1].tolist())])
+
+
+def _detail(sheet: _Sheet, profile: Profile) -> None:
+    """The edge by itself, below everything else, enlarged; the axis runs to the right as it does above."""
+    detail = edge_detail(profile, 16.0 * sheet.letters)
+    places = detail.scale * (detail.points - np.array([detail.inside, 0.0]))
+    base = sheet.bottom + 3.5 * sheet.letters + float(places[:, 0].max())
+    end, low = float(places[-1, 1]), base + 0.6 * sheet.letters * (detail.inside > 0.0)
+    edge = [(z, base - r) for r, z in places.tolist()]
+    sheet.polygon("tool cut", [(0.0, low), *edge, (end, low)], ' stroke="none"')
+    sheet.polyline("swept", edge)
+    if detail.inside == 0.0:
+        over = sheet.letters
+        sheet.line("axis", -over, base, end + over, base, dashes=(2.0, 0.4, 0.3, 0.4))
+    words = f"edge {_figure(detail.scale)}:1" if detail.scale >= 1.0 else f"edge 1:{_figure(1.0 / detail.scale)}"
+    sheet.text(words, end + 2.0 * sheet.letters, base - 0.5 * float(places[:, 0].max()), "small", "start")
 
 
 def _draw_contact(sheet: _Sheet, tool: Sequence[tuple[float, BeamSegment]], nose: float, tail: float) -> None:
@@ -240,9 +280,13 @@ def _lengths(
 def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float, brief: bool) -> str:
     cutter, assembly = tooling.cutter, tooling.assembly
     teeth = f"{cutter.teeth} teeth" if cutter.teeth > 1 else "1 tooth"
-    words = f"{teeth}, Ø{_figure(1e3 * cutter.diameter)}, helix {_figure(math.degrees(cutter.helix))}°"
+    helix = "/".join(_figure(angle) for angle in np.degrees(np.atleast_1d(cutter.helix)).tolist())
+    words = f"{teeth}, Ø{_figure(1e3 * cutter.diameter)}, helix {helix}°"
     words += "" if cutter.shape is CutterShape.FLAT else f", shape {cutter.shape}"
     words += f", corner radius {_figure(1e3 * cutter.corner_radius)}" if cutter.corner_radius else ""
+    told = ((name.replace("_", " "), in_files(name, value), "°" * (name in ANGLES)) for name, value in cutter.dimensions.told.items())
+    words += "".join(f", {name} {_figure(value)}{unit}" for name, value, unit in told)
+    words += "" if cutter.serration is None else f", {cutter.serration}"
     scale = "millimetres, 1:1"
     contact = assembly.contact
     joined = "tool and holder joined rigidly"
@@ -250,10 +294,13 @@ def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float, brief: bo
         stiffness = f"{1e-9 * contact.translational_stiffness:.3g} GN/m, {1e-6 * contact.rotational_stiffness:.3g} MN m/rad"
         joined = f"contact {stiffness} per m of insertion"
     if not brief:
-        left, y = sheet.left, sheet.top - 5.6 * sheet.letters
+        lines = wrap(f"{words}; {scale}", _LINE)
+        left, y = sheet.left, sheet.top - (4.0 + 1.6 * len(lines)) * sheet.letters
         sheet.text(tooling.name, left, y, anchor="start", size=1.5)
-        sheet.text(f"{words}; {scale}", left, y + 1.9 * sheet.letters, "small", "start")
-        sheet.text(joined, left, y + 3.5 * sheet.letters, "small" if contact is None else "joint", "start")
+        for k, line in enumerate(lines):
+            sheet.text(line, left, y + (1.9 + 1.6 * k) * sheet.letters, "small", "start")
+        below = (1.9 + 1.6 * len(lines)) * sheet.letters
+        sheet.text(joined, left, y + below, "small" if contact is None else "joint", "start")
     margin = (0.4 if brief else 1.5) * sheet.letters
     x, top = sheet.left - margin, sheet.top - margin
     width, height = sheet.right - sheet.left + 2.0 * margin, sheet.bottom - sheet.top + 2.0 * margin
@@ -266,7 +313,7 @@ def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float, brief: bo
         f'<rect width="{step}" height="{step}" style="fill:var(--steel)"/>'
         f'<line x1="0" y1="0" x2="0" y2="{step}" style="stroke:var(--hatch)" stroke-width="{_mm(0.1 * sheet.letters)}"/></pattern>'
     )
-    lines = [
+    parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" class="rt" role="img" width="{_mm(width)}mm" height="{_mm(height)}mm" viewBox="{box}">',
         f"<title>{_safe(tooling.name)}</title>",
         f"<desc>{_safe(described)}</desc>",
@@ -277,7 +324,7 @@ def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float, brief: bo
         *sheet.texts,
         "</svg>",
     ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(parts) + "\n"
 
 
 def _free_row(rows: list[float], x: float, half: float) -> int:

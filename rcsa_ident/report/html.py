@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.conditions import AnyEngagement, Engagement
+from rcsa_ident.cutting.shape import CutterShape
+from rcsa_ident.cutting.stock import engagement_with
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.parameters import JOINT
@@ -179,7 +181,7 @@ def tool_cards_html(cards: Sequence[ToolCard], when: datetime) -> str:
 
 def _card(card: ToolCard) -> dict[str, Any]:
     cutter, assembly, cut = card.tooling.cutter, card.tooling.assembly, card.cut
-    feed, width = cut.feed_per_tooth or 0.0, cut.engagement.immersion
+    feed = cut.feed_per_tooth or 0.0
     speeds = to_rpm(card.advice.lobes.spindle_speed[[0, -1]])
     pressure = f"K_tc {_plain(cut.coefficients['tangential'] * 1e-6)} N/mm²" if "tangential" in cut.coefficients else None
     return {
@@ -192,8 +194,7 @@ def _card(card: ToolCard) -> dict[str, Any]:
         "drawn": card.advice.lobes.drawn is not None,
         "conditions": [
             ("Machine", card.machine),
-            ("Teeth cut", f"from {cut.engagement}, {_strategy(cut.engagement)}"),
-            ("Radial immersion", f"{_plain(100.0 * width, 1)} %, {_plain(1e3 * width * cutter.diameter, 2)} mm wide"),
+            *_stock(engagement_with(cut.engagement, cutter), cutter.diameter),
             ("Feed per tooth", f"{_plain(1e3 * feed, 4)} mm"),
             ("Feed direction", f"{_plain(float(np.degrees(cut.feed_angle)), 1)}° from +X to +Y"),
             ("Material", ", ".join(filter(None, (cut.material, pressure))) or "as in the identification"),
@@ -202,7 +203,8 @@ def _card(card: ToolCard) -> dict[str, Any]:
         "tooling": [
             ("Teeth", str(cutter.teeth)),
             ("Cutting diameter", f"{_plain(1e3 * cutter.diameter, 1)} mm"),
-            ("Helix", f"{_plain(float(np.degrees(cutter.helix)), 1)}°"),
+            ("Helix", f"{' / '.join(_plain(angle, 1) for angle in np.degrees(np.atleast_1d(cutter.helix)).tolist())}°"),
+            *([] if cutter.shape is CutterShape.FLAT else [("Shape", str(cutter.shape))]),
             ("Stickout", f"{_plain(1e3 * assembly.stickout, 1)} mm"),
             ("Insertion", f"{_plain(1e3 * assembly.insertion, 1)} mm"),
         ],
@@ -211,6 +213,17 @@ def _card(card: ToolCard) -> dict[str, Any]:
         "reserve": card.reserve,
         "versions": card.versions,
     }
+
+
+def _stock(engagement: AnyEngagement, diameter: float) -> list[tuple[str, str]]:
+    """What stands around the cutter, in rows."""
+    if not isinstance(engagement, Engagement):
+        return [("Stock", str(engagement))]
+    width = engagement.immersion
+    return [
+        ("Teeth cut", f"from {engagement}, {_strategy(engagement)}"),
+        ("Radial immersion", f"{_plain(100.0 * width, 1)} %, {_plain(1e3 * width * diameter, 2)} mm wide"),
+    ]
 
 
 def _strategy(engagement: Engagement) -> str:

@@ -230,9 +230,7 @@ def march(state, motion, force, modes, layout, table, frozen, prepared):
                         free[0, 0, a] += y.real
                         free[1, 0, a] += (pole[k] * y).real
                 for d in range(delays):
-                    if where[start, d] < 0:
-                        continue
-                    for b in range(r):
+                    for b in range(r if where[start, d] >= 0 else 0):
                         value = _earlier(motion, where, weight, start, d, b)
                         for a in range(r):
                             pull[a] -= stiffness[start, d, a, b] * value
@@ -261,9 +259,7 @@ def march(state, motion, force, modes, layout, table, frozen, prepared):
                             y += echo[own, kind, j, 0, a, b] * force[start, b]
                         free[kind, j, a] = y
                 for d in range(delays):
-                    if where[node, d] < 0:
-                        continue
-                    for b in range(r):
+                    for b in range(r if where[node, d] >= 0 else 0):
                         if frozen:
                             # what was there a delay ago changes linearly over the step
                             begin = _earlier(motion, where, weight, start, d, b)
@@ -443,7 +439,10 @@ def multiplier(modes, layout, table, frozen, tolerance, waves, start):
     pole, places, where = modes.pole, layout.places, layout.where
     m, r, points = pole.size, modes.outputs.shape[0], layout.damping.shape[0]
     prepared = prepare(modes, layout, table, frozen)
-    kept = min(points, where.min())
+    kept = points
+    for place in where.ravel():
+        # below zero where nothing is looked up
+        kept = min(kept, place if place >= 0 else points)
     size = 2 * m + (points - kept) * r
     most = min(_MOST, size)
     basis, hessenberg = np.zeros((most + 1, size)), np.zeros((most + 1, most))
@@ -459,9 +458,7 @@ def multiplier(modes, layout, table, frozen, tolerance, waves, start):
     ritz = np.zeros(1, dtype=np.complex128)
     # as many eigenvalues as the structure itself has near the largest: fewer vectors may hide one of them
     duration = places[-1, 0] + places[-1, 1] * places[-1, 2]
-    look, slowest = _FIRST, -np.inf
-    for k in range(m):
-        slowest = max(slowest, pole[k].real)
+    look, slowest = _FIRST, pole.real.max()
     for k in range(m):
         if pole[k].real * duration > -_LASTS and (pole[k].real - slowest) * duration > -0.5 * _LASTS:
             look += 2

@@ -96,6 +96,8 @@ def test_the_cut_counts(shop):
     np.testing.assert_allclose(limits(ktc_mpa=1804.0, krc=0.26), 0.5 * plain, rtol=1e-9)
     np.testing.assert_allclose(limits(material="EN AW-6082"), limits(material="en aw-6082"), rtol=0)
     np.testing.assert_allclose(limits(entry_deg=90, exit_deg=180), plain, rtol=1e-9)
+    np.testing.assert_allclose(limits(stock="block", y_from_mm=-6.0, y_to_mm=0.0), plain, rtol=1e-9)
+    np.testing.assert_allclose(limits(stock="stepover"), plain, rtol=1e-9)
     np.testing.assert_allclose(limits(feed_direction=-180.0), plain, rtol=1e-9)
     assert not np.allclose(limits(feed_direction="+Y"), plain, rtol=1e-2)
     assert not np.allclose(limits(strategy="up"), plain, rtol=1e-2)
@@ -219,7 +221,8 @@ def test_unequal_pitch_and_a_shape_are_told_with_every_answer(shop):
     for answer in (lobes, advice):
         assert answer.withheld in answer.warnings
         assert answer.withheld.endswith("full-discretisation takes unlike teeth")
-        assert any("the cutter's shape is high-feed; its stability limits were 0.61 to 1.45 times" in w for w in answer.warnings)
+        told = "the cutter's shape is high-feed; cutting_edge_angle_deg and cutting_depth_mm are not told; its stability"
+        assert any(told in w for w in answer.warnings)
     # the limits recommend nothing, and the cuts come from the method that they name
     assert lobes.recommended_depth_mm == [None] * 3
     assert [lobes.recommended_by, advice.recommended_by] == ["full-discretisation"] * 2
@@ -259,6 +262,13 @@ def test_advice_stands_by_the_lobes(shop):
         ({"cut": {"immersion": 1.5}}, "cut.immersion"),
         ({"cut": {"entry_deg": 90}}, "cut.exit_deg"),
         ({"cut": {"entry_deg": 90, "exit_deg": 90}}, "cut.exit_deg"),
+        ({"cut": {"stock": "block"}}, "cut.y_from_mm"),
+        ({"cut": {"y_from_mm": 7.0, "y_to_mm": 9.0}}, "cut.y_from_mm"),
+        ({"cut": {"y_from_mm": 1.0, "y_to_mm": 2.0, "entry_deg": 10, "exit_deg": 90}}, "cut.entry_deg"),
+        ({"cut": {"stock": "stepover", "engagement": [[0.0, 10.0, 20.0]]}}, "cut.engagement"),
+        ({"cut": {"engagement": [[0.0, 30.0, 20.0]]}}, "cut.engagement"),
+        ({"cut": {"lead_deg": 5.0}}, "cut.lead_deg"),
+        ({"cut": {"kac": 50.0}}, "cut.kac"),
         ({"cut": {"material": "cheese"}}, "material"),
         ({"cut": {"runout_um": [1, 2]}}, "cut.runout_um"),
         ({"cut": {"wear_land_um": 80}}, "cut.indentation"),

@@ -17,6 +17,7 @@ from rcsa_ident.io.toml_text import keys_of_toml, toml_of
 from rcsa_ident.tool_holder.model import tool_holder_structure
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
+from tests.fixtures.cutters import keys_of as cutter_keys
 from tests.fixtures.service import example
 
 
@@ -137,12 +138,23 @@ def test_a_tooling_that_would_cost_too_much_is_refused_before_it_does():
 
 @pytest.mark.parametrize("shape", CutterShape)
 def test_shapes_of_cutters_go_in_and_come_out(client, shape):
-    cutter = {"teeth": 4, "diameter_mm": 12.0, "shape": str(shape), "corner_radius_mm": 1.5}
+    cutter = cutter_keys(shape)
     client.write_tooling("S1", example(cutter=cutter))
-    kept = client.tooling("S1").tooling.cutter
-    assert (kept.shape, kept.corner_radius_mm) == (str(shape), 1.5)
+    kept = client.tooling("S1").tooling.cutter.model_dump(exclude_none=True)
+    assert kept | {"shape": str(shape)} == pytest.approx(cutter | {"helix_deg": 0.0}) if shape is not CutterShape.PROFILE else True
     read = tooling_of(client.tooling_file("S1")).cutter
-    assert (read.shape, read.corner_radius) == (shape, 1.5e-3)
+    assert read.shape is shape
+    assert read.profile is not None
+
+
+def test_teeth_of_their_own_go_in_and_come_out(client):
+    cutter = {
+        "teeth": 2, "diameter_mm": 12.0, "helix_deg": [38.0, 41.0], "helix_kind": "angle", "runout_mm": [0.0, 0.01],
+        "axial_runout_mm": [0.0, 0.02], "tilt_deg": 0.1,
+        "serration": {"amplitude_mm": 0.25, "wavelength_mm": 1.5, "shape": "sine", "shift": [0.0, 0.5]},
+    }  # fmt: skip
+    client.write_tooling("S1", example(cutter=cutter))
+    assert client.tooling("S1").tooling.cutter.model_dump(exclude_none=True) == cutter
 
 
 def test_an_unknown_shape_is_refused_with_the_known_ones(client):

@@ -173,6 +173,15 @@ def test_process_options_reach_the_method(shop):
         (("--frf", "x.frf"), "--modes and --frf"),
         (("--frf-units", "um/N"), "given together with --frf"),
         (("--feed-per-tooth-mm", 0), "--feed-per-tooth-mm"),
+        (("--kac", 30), "--kac: found 30"),
+        (("--stock", "block"), "--y-from-mm and --y-to-mm: found nothing"),
+        (("--y-from-mm", 1), "--y-from-mm and --y-to-mm: found one of them"),
+        (("--y-from-mm", 2, "--y-to-mm", 1), "--y-to-mm: found 1"),
+        (("--y-from-mm", 7, "--y-to-mm", 9), "--y-from-mm: found block from y 7 to 9 mm"),
+        (("--y-from-mm", 1, "--y-to-mm", 2, "--entry-deg", 90, "--exit-deg", 180), "--entry-deg: found given beside --y-from-mm"),
+        (("--stock", "stepover", "--y-from-mm", 1, "--y-to-mm", 2), "--y-from-mm: found given beside --stock stepover"),
+        (("--engagement", "{}/none.csv"), "found no such file"),
+        (("--lead-deg", 5), "given together with --engagement"),
     ],
 )
 def test_bad_options_are_one_sentence(shop, more, words):
@@ -181,6 +190,16 @@ def test_bad_options_are_one_sentence(shop, more, words):
     assert words in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
     assert not (shop / "L.csv").exists()
+
+
+def test_what_stands_around_a_cylinder_is_its_engagement(shop):
+    """Half-immersion down-milling by immersion, by a block's sides and by a stepover; an axial ratio does not move a tip without Z."""
+    base = ("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, "--out", shop / "L.csv")
+    run(*base)
+    plain = read_lobes_csv(shop / "L.csv").limit
+    for more in (("--stock", "block", "--y-from-mm", -6, "--y-to-mm", 0), ("--y-from-mm", -20, "--y-to-mm", 0), ("--stock", "stepover")):
+        run(*base, *more)
+        np.testing.assert_allclose(read_lobes_csv(shop / "L.csv").limit, plain, rtol=1e-9)
 
 
 def test_without_coefficients_nothing_is_known(shop):
@@ -400,12 +419,12 @@ def test_cases_in_process_and_at_standstill(result_file, tmp_path):
     assert "8 of 8" in run(*common).stdout
 
 
-def test_a_ball_of_unequal_pitch_is_told_as_both(shop):
+def test_a_face_mill_of_unequal_pitch_is_told_as_both(shop):
     """Zero-order limits recommend nothing, the cuts come from the method that they name; the shape is said by every command."""
-    keys = 'teeth = 2\npitch_deg = [170, 190]\nshape = "ball"'
+    keys = 'teeth = 2\npitch_deg = [170, 190]\nshape = "face"'
     (shop / "B.toml").write_text(by_hand.TOOLING.replace("teeth = 4", keys), encoding="utf-8")
     tip, said = ("--modes", shop / "M.toml", shop / "B.toml", *KNOWN, *SPEEDS), "full-discretisation takes unlike teeth"
-    shape = "computed as a cylinder: the cutter's shape is ball"
+    shape = "computed as a cylinder: the cutter's shape is face; cutting_edge_angle_deg and cutting_depth_mm are not told"
     found = answer_of("lobes", *tip, "--out", shop / "L.csv")
     assert [sum(words in warning for warning in found["warnings"]) for words in (said, shape)] == [1, 1]
     assert said in found["withheld"]

@@ -43,7 +43,7 @@ def test_frf_of_one_axis(tmp_path):
     ("arguments", "words"),
     [
         (([1.0], {}), "axes: found none"),
-        (([1.0], {"Z": [1.0]}), "axes: found Z"),
+        (([1.0], {"W": [1.0]}), "axes: found W"),
         (([1.0, 1.0], {"X": [1.0, 1.0]}), "frequency_hz: found 1.0, allowed is increasing frequencies of 0 or more"),
         (([-1.0], {"X": [1.0]}), "frequency_hz: found -1.0"),
         (([1.0, 2.0], {"X": [1.0]}), "1-D arrays of one length"),
@@ -63,7 +63,7 @@ def test_frf_that_is_not_written(tmp_path, arguments, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("frequency_hz,Z_re\n1,2\n", "column X_re: found only frequency_hz, Z_re"),
+        ("frequency_hz,W_re\n1,2\n", "column X_re: found only frequency_hz, W_re"),
         ("f,X_re,X_im\n1,2,3\n", "column frequency_hz: found only"),
         ("frequency_hz,X_re\n1,2\n", "column X_im"),
         ("frequency_hz,X_re,X_im\n1,2,3\n1,2,3\n", "line 3: column frequency_hz: found 1, allowed is increasing frequencies of 0 or more"),

@@ -115,7 +115,7 @@ def test_the_tip_is_hit_where_it_is_measured(tmp_path):
     ]
     write_uff(path, records)
     found = read_tap_tests([Source(path)])
-    assert set(found) == {("X", "X"), ("Y", "Y"), ("X", "Y")}
+    assert set(found) == {("X", "X"), ("Y", "Y"), ("X", "Y"), ("Z", "Z")}
     # a sensor that looks against the force
     np.testing.assert_allclose(found["X", "X"][1], -X, rtol=1e-10)
     np.testing.assert_allclose(found["Y", "Y"][1], Y, rtol=1e-10)
@@ -156,6 +156,19 @@ def test_csv_with_cross_terms(tmp_path):
     np.testing.assert_array_equal(found["X", "Y"][1], XY)
     with pytest.raises(InputError, match="frf_units"):
         read_tap_tests([Source(path)], "um/N")
+
+
+def test_csv_with_an_axial_frf(tmp_path):
+    path = tmp_path / "F.csv"
+    cross = {"XZ_re": XY.real, "XZ_im": XY.imag}
+    write_frf_csv(path, FREQUENCY, {"X": X, "Z": Y}, cross)
+    assert path.read_text().splitlines()[0] == "frequency_hz,X_re,X_im,Z_re,Z_im,XZ_re,XZ_im"
+    found = read_tap_tests([Source(path)])
+    assert set(found) == {("X", "X"), ("Z", "Z"), ("X", "Z")}
+    np.testing.assert_array_equal(found["Z", "Z"][1], Y)
+    # what moved in X under a force in Z is of no use without the motion in Z itself
+    write_frf_csv(path, FREQUENCY, {"X": X}, cross)
+    assert set(read_tap_tests([Source(path)])) == {("X", "X")}
 
 
 def columns(separator, decimal=".", scale=1.0):

@@ -7,7 +7,7 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.modes import read_modes
+from rcsa_ident.io.modes import read_modes, read_modes_file
 
 TEXT = """\
 [[x]]
@@ -34,10 +34,19 @@ def test_receptance_of_the_modes(tmp_path):
     np.testing.assert_allclose(models[Dof.X].receptance(omega).between("tip.x", "tip.x"), expected, rtol=1e-12)
 
 
+def test_an_axial_mode_is_read_behind_the_others(tmp_path):
+    axial = "[[z]]\nnatural_frequency_hz = 1450.0\ndamping_ratio = 0.04\nstiffness_n_per_m = 6.0e7\nstiffness_sd_n_per_m = 6.0e6\n"
+    (tmp_path / "MODES.toml").write_text(axial + TEXT)
+    found = read_modes_file(tmp_path / "MODES.toml")
+    assert list(found.models) == [Dof.X, Dof.Z]
+    assert found.models[Dof.Z].receptance(np.array([0.0])).between("tip.z", "tip.z")[0] == pytest.approx(1.0 / 6e7)
+    assert found.spreads[2, -1] == pytest.approx(0.1)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("[[x]]", "[[z]]", r"z: found an unknown key"),
+        ("[[x]]", "[[w]]", r"w: found an unknown key"),
         ("[[x]]", "[x]", r"line 5, column 3: modes: found a TOML error"),
         ("damping_ratio = 0.02", "damping_ratio = 2", r"x\[0\]\.damping_ratio: found 2"),
         ("modal_mass_kg = 0.04", "", r"x\[0\]\.modal_mass_kg: found nothing, allowed is one of"),

@@ -15,10 +15,14 @@ from tests.fixtures.paths import ROOT
 #: What hangs on another key of the file, or asks for one more key or entry: only a reader knows it.
 _BETWEEN_KEYS = re.compile(
     r"finite numbers? \[deg\]|angles above 0 that add up|on a tool that is|above entry_angle_deg|at most half of the diameter|"
+    r"a list of \d+ of them, one a tooth|an amplitude below the wavelength|offsets for the shape table|"
+    r"(entry|exit)_angle_deg: found nothing|one way to tell the engagement|above y_from_mm|a block that the cutter reaches|"
+    r"needs the map of its engagement|engagement map: found no such file|never fall \[m\]|0 <= start <= end|a cut in which some tooth cuts|"
+    r"(radial_depth_mm|strategy|y_from_mm|y_to_mm): found nothing|"
     r"below the outer diameter|at most [\d.e+]+ \[mm\^[24]\]|or neither|material: found the text|tooling: found the text|"
     r"materials\.\S+: found nothing|shaft's length|a number other than 0|one table \[sensors|"
     r"above from_hz|where there are cuts|at least one tooling|hammer tests \[\[frfs\]\], or both|"
-    r"a point of the tool-holder, tip or mm|one or more speeds|\[\[x\]\], \[\[y\]\] or both|"
+    r"a point of the tool-holder, tip or mm|one or more speeds|\[\[z\]\] or several of them|"
     r"stickout|insertion|softening|settling|from.*to|without it the cut keeps its speed|of change in each pass|"
     r"times the value|of a value that is not given|radial_mpa"
 )

@@ -14,9 +14,11 @@ from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign, read_tooling
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.toolings import write_tooling
 from rcsa_ident.signals.recording import Quantity, Recording, Role
 from rcsa_ident.tool_holder.geometry import MATERIALS
+from tests.fixtures.cutters import keys_of
 
 
 def tooling_file(folder: Path, text: str, old: str = "", new: str = "") -> Path:
@@ -63,14 +65,14 @@ def test_defaults(tmp_path):
 
 
 @pytest.mark.parametrize("shape", CutterShape)
-@pytest.mark.parametrize("corner", [0.0, 1.25])
-def test_shapes_go_out_and_come_back(tmp_path, tooling_text, shape, corner):
-    keys = f'helix_deg = 30.0\nshape = "{shape}"\ncorner_radius_mm = {corner}'
-    read = read_tooling(tooling_file(tmp_path, tooling_text, "helix_deg = 30.0", keys))
-    assert (read.cutter.shape, read.cutter.corner_radius) == (shape, 1e-3 * corner)
+def test_shapes_go_out_and_come_back(tmp_path, tooling_text, shape):
+    own = toml_of(keys_of(shape) | {"helix_deg": 30.0, "pitch_deg": [90.0] * 4})
+    read = read_tooling(tooling_file(tmp_path, tooling_text, tooling_text[tooling_text.index("teeth") : tooling_text.index("[tool]")], own))
     write_tooling(tmp_path / "again.toml", read)
     again = read_tooling(tmp_path / "again.toml").cutter
-    assert (again.shape, again.corner_radius, again.teeth) == (shape, pytest.approx(1e-3 * corner), 4)
+    assert (again.shape, again.corner_radius, again.teeth) == (shape, pytest.approx(read.cutter.corner_radius), 4)
+    half = 0.5 * read.cutter.profile.height
+    assert again.profile.radius_at(half) == pytest.approx(read.cutter.profile.radius_at(half), abs=1e-12)
 
 
 def test_a_tooling_without_a_shape_is_flat_and_stays_so(tmp_path, tooling_text):

@@ -58,6 +58,21 @@ def test_cross_receptances_of_a_tap_test():
         measured_tip(curves, {(Dof.X, Dof.Y): (FREQUENCY[:5], full[:5, 0, 1])})
 
 
+def test_an_axial_frf_stands_behind_the_others():
+    x, y = planes()
+    curves = {Dof.X: (FREQUENCY, x), Dof.Z: (FREQUENCY, y)}
+    tip = measured_tip(curves)
+    assert [str(row) for row in tip.rows] == ["tip.x", "tip.y", "tip.z"]
+    np.testing.assert_array_equal(tip.between("tip.z", "tip.z"), y)
+    np.testing.assert_array_equal(tip.between("tip.x", "tip.x"), x)
+    assert not np.any(tip.between("tip.y", "tip.y"))
+    with pytest.raises(InputError, match="z receptance: found 5 frequencies"):
+        measured_tip({Dof.X: (FREQUENCY, x), Dof.Z: (FREQUENCY[:5], y[:5])})
+    full = measured_tip({**curves, Dof.Y: (FREQUENCY, y)}, {(Dof.X, Dof.Z): (FREQUENCY, 0.1 * x)})
+    np.testing.assert_array_equal(full.between("tip.x", "tip.z"), 0.1 * x)
+    np.testing.assert_array_equal(full.between("tip.z", "tip.x"), 0.1 * x)
+
+
 def test_a_direction_that_was_not_measured_is_rigid():
     tip = measured_tip({Dof.Y: (FREQUENCY, planes()[1])})
     np.testing.assert_array_equal(tip.between("tip.y", "tip.y"), planes()[1])

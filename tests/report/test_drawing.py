@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.io.cutters import CUTTER_KEYS, cutter_of
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.report.drawing import tooling_svg
+from rcsa_ident.report.edge_detail import edge_detail
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly, clamped
+from tests.fixtures.cutters import SHAPES, keys_of
 
 TOOLINGS = sorted((Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings").glob("*.toml"))
 SVG = "{http://www.w3.org/2000/svg}"
@@ -128,6 +134,49 @@ def test_a_contact_on_a_tapered_shank_follows_it():
     # at 30 of 50 mm the diameter is 16 mm
     assert sorted(float(line.get("y1", "")) for line in lines) == [-8.0, 8.0]
     assert sorted(float(line.get("y2", "")) for line in lines) == [-10.0, 10.0]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_shape_is_drawn_to_scale_and_its_edge_once_more_by_itself(shape):
+    cutter = cutter_of(Table(keys_of(shape), "", "cutter", CUTTER_KEYS))
+    tooling = replace(plain(), cutter=cutter)
+    root = drawn(tooling)
+    (swept,) = polygons(root, "swept")
+    assert swept[: len(swept) // 2] == [(x, pytest.approx(-y)) for x, y in reversed(swept[len(swept) // 2 :])]
+    for z, r in swept[len(swept) // 2 :]:
+        # a floor is one height with many radii, and near one the last digit of a height is many of a radius
+        if z > 0.1:
+            assert r == pytest.approx(1e3 * cutter.profile.radius_at(min(1e-3 * z, cutter.profile.height)), abs=2e-3)
+    (text,) = [text for text in texts(root) if text.startswith("edge ")]
+    larger, smaller = (float(part) for part in text.removeprefix("edge ").split(":"))
+    (edge,) = [corners(line) for line in root.iter(f"{SVG}polyline") if line.get("class") == "swept"]
+    tall = max(x for x, _ in edge) - min(x for x, _ in edge)
+    inner, outer = max(y for _, y in edge), min(y for _, y in edge)
+    high, scale = tall * smaller / larger, larger / smaller
+    assert high <= 1e3 * cutter.profile.height + 1e-3
+    # the widest place that is shown is as far from the lowest as it is on the cutter
+    inside = max(0.0, 1e3 * max(cutter.profile.outline(1e-3 * high)[:, 0]) - (inner - outer) / scale)
+    assert (inner - outer) / scale == pytest.approx(1e3 * max(cutter.profile.outline(1e-3 * high)[:, 0]) - inside, abs=1e-3)
+    assert any(f"shape {shape}" in words for words in texts(root)) or shape == "flat"
+
+
+def test_a_cylinder_has_no_second_view():
+    root = drawn(plain())
+    assert not list(root.iter(f"{SVG}polyline"))
+    assert not any(text.startswith("edge ") for text in texts(root))
+
+
+@pytest.mark.parametrize(
+    ("shape", "scale", "inside"),
+    [("bull-nose", 2.0, 1.84), ("ball", 2.0, 0.0), ("face", 2.0, 2.469), ("chamfer", 2.0, 0.0)],
+)
+def test_the_view_of_an_edge_holds_what_bends(shape, scale, inside):
+    profile = cutter_of(Table(keys_of(shape), "", "cutter", CUTTER_KEYS)).profile
+    found = edge_detail(profile, 20.0)
+    assert (found.scale, round(found.inside, 3)) == (scale, inside)
+    bent = max(segment.ends[1] for segment in profile.segments)
+    assert found.points[-1, 1] >= 1e3 * bent
+    assert np.ptp(found.points[:, 0]) * found.scale <= 20.0
 
 
 @settings(max_examples=60, deadline=None)

@@ -1,0 +1,61 @@
+"""MAP.csv: between which angles an edge cuts at which height, as CAM systems and removal simulations tell it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.conditions import EngagementMap
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.files import write_text
+from rcsa_ident.io.text_columns import read_table
+
+COLUMNS = ("z_mm", "entry_angle_deg", "exit_angle_deg")
+#: Rows of a map, at most.
+MOST_ROWS = 10_000
+
+
+def read_engagement_map(path: str | Path, lead: float = 0.0) -> EngagementMap:
+    """Return the engagement of a map; a height that stands several times has several arcs.
+
+    Parameters
+    ----------
+    path : path
+        With columns ``z_mm`` from the tip up, ``entry_angle_deg`` and ``exit_angle_deg``.
+    lead : float [rad]
+        By which the tool leans in the direction of the feed: so far the feed climbs towards the spindle.
+
+    Raises
+    ------
+    InputError
+        Names the file and the column.
+    """
+    table = read_table(path, "engagement map")
+    for name in COLUMNS:
+        if name not in table.header:
+            raise InputError(f"column {name}", "nothing", f"columns {', '.join(COLUMNS)}", table.where)
+    columns = table.columns(COLUMNS)
+    if not 1 <= columns[0].size <= MOST_ROWS:
+        raise InputError("engagement map", f"{columns[0].size} rows", f"1 to {MOST_ROWS}", table.where)
+    try:
+        return engagement_map_of(columns[0], columns[1], columns[2], lead)
+    except InputError as error:
+        raise error.at(table.where) from None
+
+
+def engagement_map_of(z_mm: FloatArray, entry_deg: FloatArray, exit_deg: FloatArray, lead: float = 0.0) -> EngagementMap:
+    """Return the engagement map of heights [mm] and angles [deg], each of shape (n,), for a tool that leads by an angle [rad]."""
+    return EngagementMap(1e-3 * np.asarray(z_mm), np.radians(entry_deg), np.radians(exit_deg), lead)
+
+
+def write_engagement_map(path: str | Path, engagement: EngagementMap) -> None:
+    """Write a map as `read_engagement_map` reads it."""
+    lines = [",".join(COLUMNS), *(",".join(f"{value:.12g}" for value in row) for row in rows_of_map(engagement).tolist())]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def rows_of_map(engagement: EngagementMap) -> FloatArray:
+    """Return heights [mm] and angles [deg] of a map, shape (n, 3)."""
+    return np.stack([1e3 * engagement.z, np.degrees(engagement.start), np.degrees(engagement.end)], axis=1)
