@@ -14,9 +14,10 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.stability.axial_doubt import axial_doubt
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes, fitted_modes, known_modes
+from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes, fitted_modes, known_modes, receptance_of
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 _ZERO_ORDER = ZeroOrder()
@@ -100,7 +101,8 @@ def _limits(
         what = "a fit with" if known is None else "the assembly's own"
         told = f"the receptance was replaced by {what} {modes.pole.size} modes (relative error {share} %)"
         found = replace(found, warnings=(*found.warnings, told))
-    found = replace(found, warnings=(*found.warnings, *process.remarks))
+    axial = "" if plain else _axial(both, process, found)
+    found = replace(found, warnings=(*found.warnings, *([axial] if axial else []), *process.remarks))
     if draws < 2 or not isinstance(tip, UncertainReceptance) or not tip.complete:
         return found
     if isinstance(method, ZeroOrder):
@@ -109,6 +111,18 @@ def _limits(
     nominal = _ZERO_ORDER.lobes(both, process, speeds, DEEPER * max_depth).limit_depth
     told = "the uncertainty band is scaled from the zero-order method's"
     return replace(found, drawn=in_proportion(drawn, nominal, found.limit_depth), warnings=(*found.warnings, told))
+
+
+def _axial(tip: Receptance | TipModes, process: MillingProcess, found: StabilityLobes) -> str:
+    """What a soft axis would change, where the tip knows X and Y alone."""
+    receptance = receptance_of(tip)
+    return axial_doubt(receptance, process, found) if len(receptance.rows) == 2 and _pushes_along(process, found) else ""
+
+
+def _pushes_along(process: MillingProcess, found: StabilityLobes) -> bool:
+    """Whether an axial motion changes the chip: not where the edge is a wall."""
+    rows = rows_of(process.cutter, process.engagement, found.max_depth, process.feed_per_tooth)
+    return bool(rows.count and np.max(np.abs(np.cos(rows.kappa))) > 1e-9) and process.speed_variation is None
 
 
 def drawn_limits(

@@ -126,6 +126,25 @@ def test_zero_order_of_a_cylinder_drawn_as_a_shape_is_the_closed_form():
     assert two.absolute_limit == pytest.approx(one.absolute_limit, rel=2e-3)
 
 
+def test_a_rigid_axis_is_said_where_it_matters():
+    """With the axial mode of the words the limits are those of the words' range."""
+    process, tip, rpm, _ = mills.LIMITS["B, Z rigid"]
+    found = stability_lobes(tip, process, np.array(rpm) * mills.RPM, 0.0059)
+    said = [words for words in found.warnings if "taken as rigid" in words]
+    assert len(said) == 1
+    low, high = (float(words) for words in said[0].split("limits would be ")[1].split(" times")[0].split(" to "))
+    chatter = found.chatter_frequency[np.argmin(found.limit_depth)] / (2.0 * np.pi)
+    ratios = []
+    for place in (0.9, 1.1):
+        soft = mills.tip((*mills.M3[:2], (2, place * chatter, 0.03, 5e7)))
+        ratios += (stability_lobes(soft, process, np.array(rpm) * mills.RPM, 0.0059).limit_depth / found.limit_depth).tolist()
+    assert (low, high) == pytest.approx((min(ratios), max(ratios)), abs=0.02)
+    # with Z there is nothing to say, nor of a wall
+    assert not [words for words in stability_lobes(soft, process, [rpm[0] * mills.RPM], 0.0059).warnings if "rigid" in words]
+    wall = stability_lobes(tip, replace(mills.HELIX, coefficients=process.coefficients), [4200 * mills.RPM], 0.014)
+    assert not [words for words in wall.warnings if "rigid" in words]
+
+
 def test_zero_order_says_that_unlike_teeth_are_not_its_business():
     for process in (mills.HELIX, mills.HELIX_PITCH, mills.rougher(0.08e-3)):
         found = stability_lobes(mills.tip(mills.M1[:2]), process, [4200 * mills.RPM], 0.014)
