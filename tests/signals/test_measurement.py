@@ -12,7 +12,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign, read_tooling
-from rcsa_ident.signals.measurement import among_fellows, fits_by_chance, forced_orders, measure_cut
+from rcsa_ident.signals.measurement import among_fellows, fits_by_chance, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.virtual.rotor import frequency_response, rotor
@@ -157,39 +157,6 @@ def test_lines_carry_force_and_slopes_at_the_records_speed():
         np.testing.assert_allclose(lines.force, force[:, column], rtol=1e-4)
         assert lines.force_slope.shape == (lines.order.size, len(SLOPES))
         np.testing.assert_allclose(lines.force_slope, slope[:, column], rtol=1e-3, atol=1e-4)
-
-
-UNLIKE = {
-    "pitch": Cutter(4, 16e-3, np.radians(30.0), np.radians([80.0, 100.0, 85.0, 95.0])),
-    "helix": Cutter(4, 16e-3, np.radians([28.0, 34.0, 29.0, 35.0])),
-    "two pitches": Cutter(4, 16e-3, np.radians(30.0), np.radians([84.0, 96.0, 84.0, 96.0])),
-}
-
-
-@pytest.mark.parametrize("name", list(UNLIKE))
-def test_unlike_teeth_tell_lines_between_their_tooth_passing_ones(name):
-    made = pair(14, 8000.0, cutter=UNLIKE[name], trigger={})
-    told = 0
-    for axis, lines in made.measure().measurement.axes.items():
-        between = lines.order % 4 != 0
-        # all of them are those of the receptance, as far as noise lets them
-        expected = made.expected(lines, axis)
-        allowed = 5.0 * np.sqrt(2.0 * lines.summed().variance[:, 0]) + 0.01 * np.abs(expected)
-        assert np.all(np.abs(lines.receptance - expected) < allowed)
-        told += np.count_nonzero(between)
-        # what run-out may make as well is left out
-        assert np.all(np.abs(lines.force_slope[between, SLOPES.index("run-out")]) < 0.02)
-        if name == "two pitches":
-            assert np.all(lines.order % 2 == 0)
-    # where pitches are in pairs every second order has a force, and an eccentricity hardly any
-    assert told >= (6 if name == "two pitches" else 1)
-
-
-def test_which_orders_have_a_force():
-    assert forced_orders(Cutter(4, 0.012), 12).tolist() == [4, 8, 12]
-    # what runs out is not known, and no order to count on
-    assert forced_orders(Cutter(4, 0.012, runout=[1e-6, 0.0, 0.0, 0.0]), 8).tolist() == [4, 8]
-    assert forced_orders(UNLIKE["helix"], 5).tolist() == [1, 2, 3, 4, 5]
 
 
 def test_one_axis_alone():
