@@ -146,6 +146,8 @@ class _Disturbance:
     ) -> None:
         if not cutter.equally_spaced:
             raise InputError("cutter", "unequal pitch or run-out", "equal teeth, whose steady cut repeats from tooth to tooth")
+        if not cutter.is_cylinder:
+            raise InputError("cutter", str(cutter), "a cylinder: of no other shape this limit is known")
         names = [str(c) for c in dynamics.coordinates]
         tip = dynamics.outputs[[names.index("tip.x"), names.index("tip.y")]]
         self.cutter, self.conditions, self.coefficients = cutter, conditions, coefficients

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -52,26 +52,26 @@ class CutHistory:
         Immersion angle of tooth 1 at the tip, from the feed's normal, growing.
     force : array, shape (n, 2) [N]
         Force on the tool, machine axes X and Y.
-    axial : array, shape (n,) [N]
-        Force on the tool along z, from the tip to the spindle; the machine is rigid that way.
     tip, flange, fixture : arrays, shape (n, 2) [m]
         Absolute displacements, X and Y; the tip's is relative to the workpiece where that gives way, too.
     acceleration : array, shape (n, 2 + 2 h) [m/s^2]
         Acceleration of the fixture, then of each of h further points, of the housing and last of the workpiece, X and Y.
+    axial : array, shape (n,) [N]
+        Force on the tool along z, from the tip to the spindle; the machine is rigid that way.
     """
 
     step: float
     angle: FloatArray
     force: FloatArray
-    axial: FloatArray
     tip: FloatArray
     flange: FloatArray
     fixture: FloatArray
     acceleration: FloatArray
+    axial: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def after(self, count: int) -> CutHistory:
         """Return the history without its first `count` instants."""
-        series = (self.angle, self.force, self.axial, self.tip, self.flange, self.fixture, self.acceleration)
+        series = (self.angle, self.force, self.tip, self.flange, self.fixture, self.acceleration, self.axial)
         return CutHistory(self.step, *(values[count:] for values in series))
 
 

@@ -12,6 +12,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.directional import mean_directional_matrix
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -193,6 +194,7 @@ def test_nothing_is_unstable_in_the_bracket():
         ({"bracket": (2e-3, 1e-3)}, "smaller and a larger"),
         ({"bracket": (0.0, 1e-3)}, "bracket"),
         ({"cutter": Cutter(2, 0.012, pitch=np.radians([170.0, 190.0]))}, "equal teeth"),
+        ({"cutter": Cutter(2, 0.012, profile=Profile.ball(0.012))}, "a cylinder"),
         ({"cutter": Cutter(2, 0.012, runout=np.array([0.0, 1e-6]))}, "equal teeth"),
         ({"step": 0.0}, "step"),
     ],
