@@ -83,6 +83,17 @@ def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable
         page.get_by_role("button", name="Take this holder").click()
         page.wait_for_selector("details .note")
 
+    def shaped(page: Page) -> None:
+        page.get_by_label("Shape", exact=True).select_option("face")
+        for label, value in (("Cutting edge angle", "45"), ("Edge height", "4"), ("Corner radius", "0.8")):
+            page.get_by_label(label, exact=True).fill(value)
+        page.get_by_text("Waves along the edges").click()
+        page.wait_for_timeout(800)
+
+    def own_outline(page: Page) -> None:
+        page.get_by_label("Shape", exact=True).select_option("profile")
+        page.wait_for_timeout(500)
+
     def edits_left(page: Page) -> None:
         page.get_by_label("Teeth", exact=True).fill("7")
         page.locator("nav").get_by_role("link", name="Toolings", exact=True).first.click()
@@ -101,6 +112,8 @@ def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable
         "tapped": (known["tap"], tapped),
         "forces_shown": (known["forces"], forces_shown),
         "holder_taken": (known["new_tooling"], holder_taken),
+        "shaped": (known["new_tooling"], shaped),
+        "own_outline": (known["new_tooling"], own_outline),
         "edits_left": (known["tooling"], edits_left),
         "intake": (known["machines"], intake),
         "exact": (known["change"], exact),

@@ -251,23 +251,63 @@ def test_a_tooling_is_drawn_as_it_is_written(opened, client: Client, shop: str):
 
 def test_the_shape_of_a_cutter_is_kept_and_said(opened, client: Client, shop: str):
     page = opened("#/toolings/new?from=T1")
-    page.get_by_label("Shape").select_option("ball")
-    page.get_by_label("Corner radius").fill("6")
+    page.get_by_label("Shape", exact=True).select_option("face")
+    expect(page.get_by_text("Without cutting edge angle and edge height or largest diameter it is computed as a cylinder.")).to_be_visible()
+    page.get_by_label("Corner radius").fill("0.8")
     page.get_by_label("Pitch angles").fill("84, 96, 84, 96")
-    page.get_by_label("Name", exact=True).fill("T1-ball")
+    page.get_by_label("Name", exact=True).fill("T1-face")
     page.get_by_role("button", name="Put into the library").click()
-    expect(page.get_by_role("heading", name="T1-ball")).to_be_visible()
-    kept = client.tooling("T1-ball").tooling.cutter
-    assert (kept.shape, kept.corner_radius_mm, kept.pitch_deg) == ("ball", 6.0, [84.0, 96.0, 84.0, 96.0])
-    again = opened("#/toolings/edit/T1-ball")
-    expect(again.get_by_label("Shape")).to_have_value("ball")
-    expect(again.get_by_label("Corner radius")).to_have_value("6")
-    asked = opened(f"#/change?machine={shop}&tooling=T1-ball")
+    expect(page.get_by_role("heading", name="T1-face")).to_be_visible()
+    kept = client.tooling("T1-face").tooling.cutter
+    assert (kept.shape, kept.corner_radius_mm, kept.pitch_deg) == ("face", 0.8, [84.0, 96.0, 84.0, 96.0])
+    again = opened("#/toolings/edit/T1-face")
+    expect(again.get_by_label("Shape", exact=True)).to_have_value("face")
+    expect(again.get_by_label("Corner radius")).to_have_value("0.8")
+    asked = opened(f"#/change?machine={shop}&tooling=T1-face")
     expect(asked.locator(".best")).to_contain_text("It was computed by full-discretisation", timeout=60_000)
     expect(asked.locator(".change-results .note.doubt")).to_contain_text("full-discretisation takes unlike teeth")
-    expect(asked.locator(".change-results .note.doubt")).to_contain_text("computed as a cylinder: the cutter's shape is ball")
+    told = "computed as a cylinder: the cutter's shape is face; cutting_edge_angle_deg and cutting_depth_mm are not told"
+    expect(asked.locator(".change-results .note.doubt")).to_contain_text(told)
     expect(asked.locator(".reads li")).to_contain_text("no depth recommended")
-    client.forget_tooling("T1-ball")
+    client.forget_tooling("T1-face")
+
+
+def test_the_editor_asks_only_for_what_a_shape_needs_and_draws_it(opened, client: Client, shop: str):
+    page = opened("#/toolings/new?from=T1")
+    image = page.locator("img.drawing")
+    fields = ("Corner radius", "Cutting edge angle", "Profile radius", "Neck diameter", "Points of the outline")
+    for shape, asked in (("flat", fields[:1]), ("ball", ()), ("lollipop", fields[3:4]), ("profile", fields[4:]), ("face", fields[:2])):
+        page.get_by_label("Shape", exact=True).select_option(shape)
+        for label in fields:
+            expect(page.get_by_label(label)).to_be_visible(visible=label in asked)
+    first = image.get_attribute("src")
+    page.get_by_label("Cutting edge angle").fill("45")
+    page.get_by_label("Edge height").fill("3")
+    expect(image).not_to_have_attribute("src", first)
+    expect(page.get_by_text("it is computed as a cylinder")).to_be_hidden()
+    # what cannot be stands beside its field
+    page.get_by_label("Corner radius").fill("7")
+    assert "at most half of the diameter" in fault_beside(page, "cutter.corner_radius_mm")
+    page.get_by_label("Corner radius").fill("0.4")
+    page.get_by_label("Helix [°]").fill("30, 32, 30, 32")
+    page.get_by_text("Waves along the edges").click()
+    page.get_by_label("Wave amplitude").fill("0.2")
+    page.get_by_label("Wavelength").fill("1.5")
+    page.get_by_label("Name", exact=True).fill("T1-shaped")
+    page.get_by_role("button", name="Put into the library").click()
+    expect(page.get_by_role("heading", name="T1-shaped")).to_be_visible()
+    kept = client.tooling("T1-shaped").tooling.cutter.model_dump(exclude_none=True)
+    assert kept == {
+        "teeth": 4, "diameter_mm": 12.0, "helix_deg": [30.0, 32.0, 30.0, 32.0], "shape": "face", "corner_radius_mm": 0.4,
+        "cutting_edge_angle_deg": 45.0, "cutting_depth_mm": 3.0, "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5},
+    }  # fmt: skip
+    again = opened("#/toolings/edit/T1-shaped")
+    again.get_by_label("Shape", exact=True).select_option("profile")
+    again.get_by_label("Points of the outline").fill("0 0, 5 0, 6 1 1, 6 10")
+    again.get_by_role("button", name="Save").click()
+    until(lambda: client.tooling("T1-shaped").tooling.cutter.shape == "profile")
+    assert client.tooling("T1-shaped").tooling.cutter.profile == [[0.0, 0.0], [5.0, 0.0], [6.0, 1.0, 1.0], [6.0, 10.0]]
+    client.forget_tooling("T1-shaped")
 
 
 def test_a_longer_stickout_takes_the_tool_out_of_the_bore(opened):

@@ -96,7 +96,7 @@ function sheet({ name, machine, keys, question, found, software, versions }) {
     facts([
       ["Teeth", String(keys.cutter.teeth)],
       ["Cutting diameter", q("length", keys.cutter.diameter_mm, { digits: 1 })],
-      ["Helix", `${plain(keys.cutter.helix_deg ?? 0, 1)}°`],
+      ["Helix", `${[keys.cutter.helix_deg ?? 0].flat().map((each) => plain(each, 1)).join(" / ")}°`],
       ["Stickout", q("length", keys.tool.stickout_mm, { digits: 1 })],
       ["Insertion", q("length", keys.holder.insertion_mm, { digits: 1 })],
     ]),

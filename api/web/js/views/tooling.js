@@ -2,16 +2,17 @@
 import { getText, part, Problem, send, get } from "../api.js";
 import { add, card, fill, h, head, link, save, tell } from "../dom.js";
 import { drawn, picture } from "../drawing.js";
-import { busy, clearFaults, confirmed, failed, field, quantity, select, showProblem } from "../forms.js";
+import { busy, clearFaults, confirmed, failed, field, quantity, showProblem } from "../forms.js";
 import { go, holdsEdits, to } from "../router.js";
 import { machine } from "../state.js";
 import { q, text } from "../units.js";
 import { trail } from "./changes.js";
 import { contactCard } from "./contact_card.js";
+import { cutterShape } from "./cutter_shape.js";
 import { doubtCard } from "./doubt_card.js";
 import { catalogueBox } from "./holder_catalogue.js";
 import { segmentsTable } from "./segments.js";
-import { SHAPES, START } from "./tooling_start.js";
+import { START } from "./tooling_start.js";
 
 // of the tool inside the bore, in diameters of its shank: below it no clamping holds; as where the library asks for stickouts
 const LEAST_INSERTION = 1;
@@ -28,13 +29,10 @@ export async function view({ name = "" }, query, place) {
   const cutter = {
     teeth: quantity("Teeth", "none", keys.cutter.teeth, { name: "cutter.teeth" }),
     diameter_mm: quantity("Cutting diameter", "length", keys.cutter.diameter_mm, { name: "cutter.diameter_mm" }),
-    helix_deg: quantity("Helix", "degree", keys.cutter.helix_deg ?? 0, { name: "cutter.helix_deg" }),
   };
-  const shape = select(SHAPES, keys.cutter.shape ?? "flat");
-  const corner = quantity("Corner radius", "length", keys.cutter.corner_radius_mm ?? null, {
-    name: "cutter.corner_radius_mm",
-    hint: "Empty: sharp, or not known",
-  });
+  const helix = h("input", { autocomplete: "off", placeholder: "0" });
+  helix.value = [keys.cutter.helix_deg ?? 0].flat().join(", ");
+  const shape = cutterShape(keys.cutter);
   const pitch = h("input", { autocomplete: "off", placeholder: "equal" });
   pitch.value = (keys.cutter.pitch_deg ?? []).join(", ");
   const stickout = quantity("Stickout", "length", keys.tool.stickout_mm, { name: "tool.stickout_mm", hint: "Tip to the holder's face" });
@@ -113,15 +111,14 @@ export async function view({ name = "" }, query, place) {
         field("Name", called, { name: "name", hint: "Letters, digits and . _ + ( ) -", double: true }),
         cutter.teeth,
         cutter.diameter_mm,
-        cutter.helix_deg,
-        field("Shape", shape, { name: "cutter.shape", hint: "Computed as a cylinder; answers say what that means" }),
-        corner,
+        field("Helix [°]", helix, { name: "cutter.helix_deg", hint: "One, or one a tooth with commas" }),
         field("Pitch angles [°]", pitch, { name: "cutter.pitch_deg", hint: "For unequal pitch, with commas" }),
         stickout,
         insertion,
       ),
       offer,
     ),
+    card("Shape of the edges", null, shape.parts),
     card("Tool", null, tool.box),
     card(
       "Holder",
@@ -154,7 +151,7 @@ export async function view({ name = "" }, query, place) {
   );
   store.setAttribute("form", (form.id = "tooling-form"));
   // what is shown, not what is stored: an empty field and no key are the same here
-  const state = () => JSON.stringify([...form.querySelectorAll("input, select")].map((each) => each.value));
+  const state = () => JSON.stringify([...form.querySelectorAll("input, select, textarea")].map((each) => each.value));
   let saved = state();
   holdsEdits(() => state() !== saved);
 
@@ -165,23 +162,15 @@ export async function view({ name = "" }, query, place) {
         ...keys.cutter,
         teeth: whole(cutter.teeth.input.base),
         diameter_mm: cutter.diameter_mm.input.base,
-        helix_deg: cutter.helix_deg.input.base ?? 0,
+        helix_deg: angles(helix).length > 1 ? angles(helix) : (angles(helix)[0] ?? 0),
       },
       tool: { ...keys.tool, stickout_mm: stickout.input.base, segments: tool.rows() },
       holder: { ...keys.holder, insertion_mm: insertion.input.base, segments: holder.rows() },
     };
     if (taper.value.trim()) found.holder.taper = taper.value.trim();
     else delete found.holder.taper;
-    if (shape.value === "flat") delete found.cutter.shape;
-    else found.cutter.shape = shape.value;
-    if (corner.input.base) found.cutter.corner_radius_mm = corner.input.base;
-    else delete found.cutter.corner_radius_mm;
-    const angles = pitch.value.trim();
-    if (angles)
-      found.cutter.pitch_deg = angles
-        .split(/[;,\s]+/)
-        .filter(Boolean)
-        .map(Number);
+    shape.write(found.cutter);
+    if (angles(pitch).length) found.cutter.pitch_deg = angles(pitch);
     else delete found.cutter.pitch_deg;
     contact.write(found);
     doubts.write(found);
@@ -281,5 +270,11 @@ export async function view({ name = "" }, query, place) {
   };
 }
 
+/** Angles of a field that takes several. */
+const angles = (input) =>
+  input.value
+    .split(/[;,\s]+/)
+    .filter(Boolean)
+    .map(Number);
 // what is not a whole number goes to the service as it is: it says what it wants
 const whole = (value) => value;

@@ -32,5 +32,5 @@ export const SHAPES = [
   ["lollipop", "lollipop"],
   ["chamfer", "chamfer mill"],
   ["dovetail", "dovetail"],
-  ["profile", "outline of its own"],
+  ["profile", "own outline"],
 ];
