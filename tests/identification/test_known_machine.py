@@ -53,7 +53,7 @@ def machine(whole):
 @pytest.fixture(scope="module")
 def data():
     """Further cuts of a tool whose file believes its diameter to 2 %, where the earlier ones' believed 3 %, and of an unknown gain."""
-    axes = tuple(SimpleNamespace(axis=axis) for axis in (Dof.X, Dof.Y))
+    axes = tuple(SimpleNamespace(axis=axis, still=np.zeros(0, dtype=bool)) for axis in (Dof.X, Dof.Y))
     rough = SimpleNamespace(unknowns=(RoughUnknown("stickout", "new", "tooling"), SEEN), spread=np.array([5e-5, 0.02]))
     return SimpleNamespace(axes=axes, rough=rough, rough_place=slice(1, 3), coefficient_spread=(0.05, 1.0, 1.0))
 
