@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,6 +17,8 @@ from rcsa_ident.identification.known_machine import FurtherMisfit, Gaussian, Kno
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.model_order import OUTLYING, cut_weights, evidence, model_error
 from rcsa_ident.identification.parameters import JOINT, Layout, planes
+from rcsa_ident.tool_holder.alteration import ALTERATIONS
+from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 
 #: Logarithms of contact stiffnesses at which fits start: errors of a tip by a third and more are far from linear.
 STARTS = (-0.6, 0.0, 0.6)
@@ -88,15 +91,22 @@ class FurtherFit:
         moved = np.abs(self.values - centre) / np.sqrt(np.diag(covariance))
         return float(np.max(moved[own]))
 
-    def machine(self, known: KnownMachine) -> KnownMachine:
-        """Return the machine, and what was known of earlier toolings, with what these cuts tell of them.
+    def machine(self, known: KnownMachine, names: Sequence[str]) -> KnownMachine:
+        """Return the machine, and what is known of toolings, with what these cuts tell of them.
 
         Of earlier toolings that have nothing in common with these ones, v, the machine's change tells by what they had in common with
-        it, m: v + K dm with K = cov(v, m) cov(m)^-1, and cov(v) - K (cov(m) - cov'(m)) K^T.
+        it, m: v + K dm with K = cov(v, m) cov(m)^-1, and cov(v) - K (cov(m) - cov'(m)) K^T. Of these cuts' own toolings it holds how they
+        differ from what was learned of them: contact and section, hardly told apart, are known well together.
+
+        Parameters
+        ----------
+        known : KnownMachine
+        names : sequence of str
+            Of the toolings of these cuts.
         """
         layout, theta, covariance = planes(self.solution.layout), self.solution.theta, self.covariance_of_all
         machine = known.places(layout)
-        size, told = machine.size, [] if known.toolings is None else list(known.toolings.unknowns)
+        size = machine.size
         before = known.joint_covariance(self.data)
         entries, unit = known.entries(self.data, layout.force.start)
         ours = np.r_[machine, entries[entries >= 0]]
@@ -105,23 +115,53 @@ class FurtherFit:
         after = covariance[np.ix_(ours, ours)] / np.outer(scale, scale)
         gain = np.linalg.solve(before[np.ix_(places, places)], before[places]).T
         whole = before - gain @ (before[np.ix_(places, places)] - after) @ gain.T
-        whole = 0.5 * (whole + whole.T)
         moved = gain @ ((theta - self.known.centre)[ours] / scale)
-        toolings = None
-        if known.toolings is not None:
-            own = whole[size:, size:]
-            toolings = replace(known.toolings, mean=known.toolings.mean + moved[size:], covariance=own)
+        unknowns, spread, shares = self._own_toolings(names)
+        cross = gain @ (covariance[np.ix_(ours, self.entries)] / scale[:, None]) @ shares.T
+        whole = np.block([[whole, cross], [cross.T, shares @ self.covariance @ shares.T]])
+        toolings = known.toolings or KnownToolings((), np.zeros(0), np.zeros(0), np.zeros((0, 0)), ())
+        # what was learned of a tooling before is in what was learned now
+        kept = [k for k, each in enumerate(toolings.unknowns) if each.kind != "tooling" or each.owner not in names]
+        tail = np.r_[size + np.array(kept, dtype=np.intp), np.arange(before.shape[0], whole.shape[0])]
+        whole = 0.5 * (whole + whole.T)
+        taught = KnownToolings(
+            (*(toolings.unknowns[k] for k in kept), *unknowns),
+            np.concatenate([toolings.spread[kept], spread]),
+            np.concatenate([(toolings.mean + moved[size:])[kept], np.zeros(len(unknowns))]),
+            whole[np.ix_(tail, tail)],
+            toolings.toolings,
+        )
         found, first = {}, 0
         for i, axis in enumerate(self.data.axes):
             old = known.posteriors[axis.axis]
             core = layout.axes[i].machine.size
             here = np.r_[np.arange(first, first + core), np.arange(size - JOINT, size)]
             first += core
-            shift = moved[here]
-            rivals = tuple(rival + shift if rival.size == shift.size else rival for rival in old.rivals)
-            cross = {} if not told else {"tooling_cross": whole[here, size:], "tooling_covariance": whole[size:, size:]}
-            found[axis.axis] = replace(old, theta=theta[machine[here]], covariance=whole[np.ix_(here, here)], rivals=rivals, **cross)
-        return KnownMachine({**known.posteriors, **found}, toolings)
+            found[axis.axis] = replace(
+                old,
+                theta=theta[machine[here]],
+                covariance=whole[np.ix_(here, here)],
+                # how far they were away was asked before these cuts, which have ruled out much of it
+                rivals=(),
+                tooling_cross=whole[np.ix_(here, tail)],
+                tooling_covariance=taught.covariance,
+                rival_toolings=(),
+            )
+        return KnownMachine({**known.posteriors, **found}, taught)
+
+    def _own_toolings(self, names: Sequence[str]) -> tuple[list[RoughUnknown], FloatArray, FloatArray]:
+        """Numbers of the drawings of these cuts, their standard deviations before, and how those of the fit add up to them."""
+        rough = self.data.rough
+        assert rough is not None
+        unknowns, rows = [], []
+        for name, weights in zip(names, rough.weights * rough.spread, strict=True):
+            for field, row in zip(ALTERATIONS, weights, strict=True):
+                if np.any(row):
+                    unknowns.append(RoughUnknown(field, name, "tooling"))
+                    rows.append(row)
+        shares = np.array(rows)
+        spread = np.sqrt(np.einsum("fu,uv,fv->f", shares, self.before[1], shares))
+        return unknowns, spread, shares / spread[:, None]
 
 
 def fit_further(data: IdentificationData, machine: KnownMachine, reclamped: float) -> FurtherFit:

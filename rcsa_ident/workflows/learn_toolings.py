@@ -166,9 +166,8 @@ def learn_toolings(
         keep = np.array([k for k, name in enumerate(data.cut_ids) if name not in out], dtype=np.intp)
         fit = fit_further(data.of_cuts(keep), known, max(campaign.toolings[name].spread.spindle_joint for name in used))
     toolings = tuple(_learnt(campaign.toolings[name], fit, k) for k, name in enumerate(data.toolings))
-    return LearntToolings(
-        toolings, data.toolings, _taught(machine, fit.machine(known)), fit.misfit.model_error, fit.solution.converged, tuple(notes)
-    )
+    taught = _taught(machine, fit.machine(known, [each.drawn.name for each in toolings]))
+    return LearntToolings(toolings, data.toolings, taught, fit.misfit.model_error, fit.solution.converged, tuple(notes))
 
 
 def campaign_of_taps(tooling: Tooling, pairs: Sequence[tuple[str, str]], sensor_mass: float = 0.0) -> Campaign:

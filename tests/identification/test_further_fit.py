@@ -149,7 +149,7 @@ def test_one_tap_of_a_new_tool_teaches_its_tip(shop, machine, clamped):
     known = KnownMachine(machine.posteriors(), machine.toolings)
     fit = fit_further(of_one_tap(shop, clamped), known, 0.0)
     found = altered(shop.held_out.assembly, fit.data.rough.alteration(0, fit.values))
-    taught = _taught(machine, fit.machine(known))
+    taught = _taught(machine, fit.machine(known, [clamped.name]))
     before, after = error(machine, shop.held_out.assembly, shop, clamped), error(taught, found, shop, clamped)
     assert before > 0.15
     assert after < 0.05
