@@ -1,7 +1,8 @@
-"""One cut of a new tool: how well its tip is known before, after one slow cut, and after three.
+"""One cut or one tap of a new tool: how well its tip is known before, after one slow cut, after three, and after one tap.
 
 ``python -m benchmarks learn``. Machines, drawings and truths are those of `benchmarks.rough`, whose results are made where they are not
-there; each tooling that never cut makes the slowest stable cut of its machine's plan, and then cuts at three of its speeds. Every
+there; each tooling that never cut makes the slowest stable cut of its machine's plan, and then cuts at three of its speeds; beside that its
+tip is hit at standstill along X and Y, 1 nm/N of noise a line of 2 Hz, gains 1 % off (standard deviations). Every
 finished row is a line of ``learn.jsonl`` in the scratch folder. *With the machine as it was* takes the learned tooling on the machine of
 the first campaign; *as these cuts teach it* on the machine that has learned beside the tooling (the option `--machine` of the command).
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,21 +20,25 @@ from typing import Any
 import numpy as np
 
 from benchmarks.comparison import FREQUENCY, coverage, in_deviations, relative_error
+from benchmarks.hammer import AXES, GAIN, NOISE
 from benchmarks.machines import HELD_OUT
 from benchmarks.page import DOCS, append_row, read_rows, write_block, write_rows
 from benchmarks.rough import KINDS, identified
-from benchmarks.rough_machines import ROUGH, ROUGH_DEVELOPMENT, rough_campaign, truth_of
+from benchmarks.rough_machines import ROUGH, ROUGH_DEVELOPMENT, RoughMachine, rough_campaign, truth_of
 from benchmarks.study import read_cut
+from rcsa_ident.arrays import ComplexArray
+from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.io.simulations import true_name
-from rcsa_ident.machining_setup import Campaign, Tooling
+from rcsa_ident.machining_setup import Campaign, HammerTest, Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
-from rcsa_ident.workflows.identify import judge
+from rcsa_ident.virtual.rotor import frequency_response, rotor
+from rcsa_ident.workflows.identify import hammer_lines, judge
 from rcsa_ident.workflows.learn_toolings import learn_toolings
 
 #: Speeds of a plan, and which of them are cut, by their number.
@@ -45,7 +51,11 @@ STAGES = {
     "one-taught": "one cut, machine as it teaches",
     "three": "three, machine as it was",
     "three-taught": "three, machine as they teach",
+    "tap": "one tap, machine as it was",
+    "tap-taught": "one tap, machine as it teaches",
 }
+#: Frequencies of a tap [rad/s].
+TAP = 2.0 * np.pi * np.arange(100.0, 4301.0, 2.0)
 
 
 def compared(machine: IdentifiedMachine, tooling: Tooling, truth: Path) -> dict[str, Any]:
@@ -78,7 +88,29 @@ def learned(scratch: Path, seed: int, name: str) -> dict[str, Any]:
         notes += [note for note in (tooling.contradiction, *found.notes) if note]
         stages[label] = compared(machine, tooling.tooling, truth_of(folder))
         stages[f"{label}-taught"] = compared(found.machine, tooling.tooling, truth_of(folder))
+    campaign, tests = tapped(drawn, folder, seed, name)
+    found = learn_toolings(machine, campaign, [], tests)
+    tooling = found.toolings[0]
+    notes += [note for note in (tooling.contradiction, *found.notes) if note]
+    stages["tap"] = compared(machine, tooling.tooling, truth_of(folder))
+    stages["tap-taught"] = compared(found.machine, tooling.tooling, truth_of(folder))
     return {"machine": seed, "tooling": name, "stages": stages, "notes": notes}
+
+
+def tapped(drawn: RoughMachine, folder: Path, seed: int, name: str) -> tuple[Campaign, tuple[HammerLines, ...]]:
+    """Return a campaign of the hits of one tooling's tip, and their lines."""
+    rng = np.random.default_rng([seed, 2, list(drawn.toolings).index(name)])
+    setup, true = drawn.true[name]
+    model = rotor(setup.spindle, true.assembly)
+    read: dict[str, ComplexArray] = {}
+    for axis in AXES:
+        value = frequency_response(model, TAP, 0.0, (f"tip.{axis}",), (f"tip.{axis}",))[:, 0, 0]
+        noise = NOISE * (rng.standard_normal(TAP.size) + 1j * rng.standard_normal(TAP.size))
+        read[axis] = (1.0 + GAIN * rng.standard_normal()) * value + noise
+    tests = tuple(HammerTest(f"{name} {axis}", name, axis, 0.0, 0.0, Path(axis)) for axis in AXES)
+    told = read_campaign(folder)
+    campaign = replace(told, toolings={name: drawn.toolings[name]}, cuts=(), tests=tests)
+    return campaign, hammer_lines(campaign, lambda test: (TAP / (2.0 * np.pi), read[test.axis]))
 
 
 def _stable_cuts(scratch: Path, seed: int, name: str, label: str, speeds: tuple[int, ...]) -> tuple[Campaign, list[Reading]]:

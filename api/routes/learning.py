@@ -1,4 +1,4 @@
-"""What the cuts of a campaign teach of toolings that are new to its machine: looked at first, then taken over."""
+"""What the cuts and taps of a campaign teach of toolings that are new to its machine: looked at first, then taken over."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from api.schemas.learning import LearnAnswer
 from api.schemas.toolings import ToolingKeys
 from api.security import Caller, Guarded, WhoAsks, now
 from api.stores.campaigns import Campaign
-from api.stores.entities import ABSENT, Document, Stale, digest_of
+from api.stores.entities import ABSENT, Document, Expected, Stale, digest_of
 from api.work.learning import learn
 from api.work.requests import MachineText, TooLong, anonymous
 from api.work.toolings import parsed
@@ -32,9 +32,9 @@ _CHANGED = "the machine, the campaign or its recordings are not those that the q
 
 @router.post(
     "",
-    summary="What the cuts of a campaign teach of toolings that are new to its machine; nothing is stored",
+    summary="What the cuts and taps of a campaign teach of toolings that are new to its machine; nothing is stored",
     description="The machine's identification is taken as known; one slow, stable cut of a tooling whose drawing has a `[spread]` is "
-    "enough. A tooling that its cuts contradict is named.",
+    "enough, or a hammer test (`[[frfs]]`) of its tip along X and Y. A tooling that its cuts or taps contradict is named.",
     openapi_extra=guard("run"),
     responses=problems(404, 422),
 )
@@ -69,13 +69,10 @@ async def take_over(
     found = await _learned(request, components, campaign, known, machine)
     why = why or f"learned from the campaign {campaign.name}"
     try:
-        written = await run_in_threadpool(_written, components, caller, campaign, found, why)
-        taught = found["taught"] is not None
-        if taught:
-            await run_in_threadpool(_teach, components, caller, campaign, known, found["taught"], why)
+        written = await run_in_threadpool(_written, components, caller, campaign, known, found, why)
     except Stale:
         raise Problem(412, _CHANGED) from None
-    return _answer(campaign, etag, found, written=written, machine_written=taught)
+    return _answer(campaign, etag, found, written=written, machine_written=found["taught"] is not None)
 
 
 def _subject(components: Components, group: str, id: str) -> tuple[Campaign, MachineText, str]:
@@ -88,13 +85,14 @@ def _subject(components: Components, group: str, id: str) -> tuple[Campaign, Mac
 
 
 async def _learned(request: Request, components: Components, campaign: Campaign, machine: MachineText, teach: bool) -> dict[str, Any]:
-    declared, read, _ = await run_in_threadpool(load_campaign, components.store, components.files, campaign.group, campaign.id)
-    teacher = f"{campaign.name} ({campaign.id})"
+    declared, read, read_test = await run_in_threadpool(load_campaign, components.store, components.files, campaign.group, campaign.id)
+    teacher, reads = f"{campaign.name} ({campaign.id})", (partial(anonymous, read), partial(anonymous, read_test))
     try:
-        return await while_there(request, components.work.run(learn, machine, declared, partial(anonymous, read), teacher, teach))
+        return await while_there(request, components.work.run(learn, machine, declared, *reads, teacher, teach))
     except TooLong as error:
-        found = f"{len(declared.cuts)} cuts, which take more than {error.seconds:g} s"
-        raise InputError("campaign", found, "one of the new toolings alone: a slow, stable cut of each is enough") from None
+        hit = f" and {len(declared.tests)} hammer tests" if declared.tests else ""
+        found = f"{len(declared.cuts)} cuts{hit}, which take more than {error.seconds:g} s"
+        raise InputError("campaign", found, "one of the new toolings alone: a slow, stable cut or a tap of each is enough") from None
 
 
 def _answer(campaign: Campaign, etag: str, found: dict[str, Any], **further: Any) -> LearnAnswer:
@@ -102,10 +100,11 @@ def _answer(campaign: Campaign, etag: str, found: dict[str, Any], **further: Any
     return LearnAnswer.model_validate({"campaign": campaign.id, "machine": campaign.machine, "etag": etag, **told, **further})
 
 
-def _written(components: Components, caller: Caller, campaign: Campaign, found: dict[str, Any], why: str) -> list[str]:
-    """Write what was learned, and return the names; nothing is written where the library has another tooling under one of them."""
+def _written(components: Components, caller: Caller, campaign: Campaign, known: MachineText, found: dict[str, Any], why: str) -> list[str]:
+    """Write toolings, and the machine where it was taught, all or nothing, and return the toolings' names; nothing is written where the
+    library has another tooling under one of them."""
     kept, drawn = components.store.toolings, json.loads(campaign.text)["toolings"]
-    documents: list[tuple[Document, str]] = []
+    documents: list[Expected] = []
     for each in found["toolings"]:
         name, keys = each["name"], each["tooling"]
         if keys is None:
@@ -118,12 +117,10 @@ def _written(components: Components, caller: Caller, campaign: Campaign, found: 
         if there is None or parsed(there.text) != parsed(text):
             document = Document(caller.group, name, text, json.dumps(summary(text)), digest_of(text), now())
             documents.append((document, ABSENT if there is None else there.digest))
-    for document, before in documents:
-        kept.put(document, before, caller.note(why))
+    machine: Expected | None = None
+    if found["taught"] is not None:
+        text, told = found["taught"]["text"], found["taught"]["summary"]
+        machine = Document(campaign.group, campaign.machine, text, json.dumps(told), digest_of(text), now()), known.digest
+    if documents or machine is not None:
+        components.store.put_together(documents, machine, caller.note(why))
     return [document.name for document, _ in documents]
-
-
-def _teach(components: Components, caller: Caller, campaign: Campaign, known: MachineText, taught: dict[str, Any], why: str) -> None:
-    text = taught["text"]
-    document = Document(campaign.group, campaign.machine, text, json.dumps(taught["summary"]), digest_of(text), now())
-    components.store.identifications.put(document, known.digest, caller.note(why))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Protocol
@@ -210,6 +211,10 @@ class Documents(Protocol):
         """Delete a text and return whether there was one; raises `Stale` as `put` does."""
 
 
+#: A text to store, and the digest of the one that is expected to be there, as in `Documents.put`.
+Expected = tuple[Document, str | None]
+
+
 class Store(Protocol):
     """The store as a whole."""
 
@@ -222,6 +227,15 @@ class Store(Protocol):
     recordings: Recordings
     jobs: Jobs
     group_bytes: int
+
+    def put_together(self, toolings: Sequence[Expected], identification: Expected | None, note: Note = UNSIGNED) -> None:
+        """Store toolings and the identification of a machine, all of them or nothing.
+
+        Raises
+        ------
+        Stale
+            As `Documents.put`, of any of them.
+        """
 
     def usage(self, group: str) -> dict[str, int]:
         """Return what the rows of a group take, by kind [bytes]."""

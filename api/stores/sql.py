@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Engine, Select, Table, delete, insert, select, update
+from sqlalchemy import Connection, Engine, Select, Table, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
 from api.stores.campaigns import Campaigns, Recordings
 from api.stores.changes import IDENTIFICATION, MACHINE, TOOLING, UNSIGNED, Changes, Note
 from api.stores.database import Database, open_engine
-from api.stores.entities import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken, whole
+from api.stores.entities import ABSENT, Document, Documents, Expected, Key, Keys, Machine, Machines, Stale, Taken, whole
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import Jobs
 from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaigns
@@ -35,12 +36,25 @@ class SqlStore(Database):
         super().__init__(engine, group_bytes)
         self.keys: Keys = SqlKeys(self)
         self.machines: Machines = SqlMachines(self)
-        self.identifications: Documents = SqlDocuments(self, tables.identifications, IDENTIFICATION)
-        self.toolings: Documents = SqlDocuments(self, tables.toolings, TOOLING)
+        self._identifications = SqlDocuments(self, tables.identifications, IDENTIFICATION)
+        self._toolings = SqlDocuments(self, tables.toolings, TOOLING)
+        self.identifications: Documents = self._identifications
+        self.toolings: Documents = self._toolings
         self.changes: Changes = SqlChanges(self)
         self.campaigns: Campaigns = SqlCampaigns(self)
         self.recordings: Recordings = SqlRecordings(self)
         self.jobs: Jobs = SqlJobs(self)
+
+    def put_together(self, toolings: Sequence[Expected], identification: Expected | None, note: Note = UNSIGNED) -> None:
+        # in the order of names: two writers of the same never wait for each other
+        writes = [(self._toolings, *each) for each in sorted(toolings, key=lambda each: each[0].name)]
+        writes += [] if identification is None else [(self._identifications, *identification)]
+        try:
+            with self.writing() as connection:
+                for documents, document, expected in writes:
+                    documents.put_in(connection, document, expected, note)
+        except IntegrityError:
+            self.put_together(toolings, identification, note)
 
     def forget_repeats(self, now: datetime) -> None:
         with self.writing() as connection:
@@ -152,27 +166,31 @@ class SqlDocuments:
         self.columns = tables.columns_of(table, Document)
 
     def put(self, document: Document, expected: str | None = None, note: Note = UNSIGNED) -> bool:
-        t, data = self.table, asdict(document)
-        size = tables.size_of(data)
-        here = (t.c.group == document.group, t.c.name == document.name)
         try:
             with self.store.writing() as connection:
-                there = connection.execute(select(t.c.digest).where(*here).with_for_update()).scalar()
-                if expected is not None and (there or ABSENT) != expected:
-                    raise Stale
-                if there != document.digest:
-                    # the version that it leaves is as large
-                    self.store.check_room(connection, document.group, 2 * size)
-                if there is None:
-                    connection.execute(insert(t).values(data))
-                else:
-                    connection.execute(update(t).where(*here).values(data | {"stored": size}))
-                if there != document.digest:
-                    log_document(connection, self.kind, data, note, there is None)
-                return there is None
+                return self.put_in(connection, document, expected, note)
         except IntegrityError:
             # another writer stored the first text of that name at the same moment
             return self.put(document, expected, note)
+
+    def put_in(self, connection: Connection, document: Document, expected: str | None, note: Note) -> bool:
+        """Store a text within a transaction, as `put` does."""
+        t, data = self.table, asdict(document)
+        size = tables.size_of(data)
+        here = (t.c.group == document.group, t.c.name == document.name)
+        there = connection.execute(select(t.c.digest).where(*here).with_for_update()).scalar()
+        if expected is not None and (there or ABSENT) != expected:
+            raise Stale
+        if there != document.digest:
+            # the version that it leaves is as large
+            self.store.check_room(connection, document.group, 2 * size)
+        if there is None:
+            connection.execute(insert(t).values(data))
+        else:
+            connection.execute(update(t).where(*here).values(data | {"stored": size}))
+        if there != document.digest:
+            log_document(connection, self.kind, data, note, there is None)
+        return there is None
 
     def get(self, group: str, name: str) -> Document | None:
         t = self.table

@@ -9,25 +9,29 @@ from api.work import tasks
 from api.work.machine_cache import is_result, parsed
 from api.work.requests import MachineText
 from api.work.toolings import keys_of
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import layout, plain
 from rcsa_ident.io.taught_results import taught_result
-from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.signals.recording import Recording
 
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
+ReadTest = Callable[[HammerTest], tuple[FloatArray, ComplexArray]]
 
 
-def learn(machine: MachineText, campaign: Campaign, read: ReadCut, teacher: str, teach: bool = False) -> dict[str, Any]:
-    """Return what the cuts of a campaign teach of toolings that are new to a machine.
+def learn(
+    machine: MachineText, campaign: Campaign, read: ReadCut, read_test: ReadTest, teacher: str, teach: bool = False
+) -> dict[str, Any]:
+    """Return what the cuts and taps of a campaign teach of toolings that are new to a machine.
 
     Parameters
     ----------
     machine : MachineText
     campaign : Campaign
-        With the cuts whose recordings are there.
-    read : callable
+        With the cuts and hammer tests whose recordings are there.
+    read, read_test : callable
     teacher : str
         What the machine remembers of the campaign.
     teach : bool
@@ -39,7 +43,7 @@ def learn(machine: MachineText, campaign: Campaign, read: ReadCut, teacher: str,
     InputError
         A measured flange, a campaign that has taught this machine already, or as `learn_toolings`.
     """
-    from rcsa_ident.workflows.identify import judge, left_out
+    from rcsa_ident.workflows.identify import hammer_lines, judge, left_out
     from rcsa_ident.workflows.learn_toolings import learn_toolings, learnt_row
 
     if not is_result(machine.text):
@@ -49,7 +53,7 @@ def learn(machine: MachineText, campaign: Campaign, read: ReadCut, teacher: str,
         raise InputError("campaign", "cuts that have taught this machine already", "a campaign of further cuts: these would count twice")
     known = machine_from_json(data, "")
     readings = judge(campaign, read)
-    found = learn_toolings(known, campaign, readings)
+    found = learn_toolings(known, campaign, readings, hammer_lines(campaign, read_test))
     row = learnt_row(found)
     for name, each, told in zip(found.keys, found.toolings, row["toolings"], strict=True):
         told |= {"name": name, "tooling": None if each.contradiction else keys_of(each.tooling)}

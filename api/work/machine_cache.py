@@ -136,7 +136,8 @@ def _limits(data: dict[str, Any]) -> None:
         raise InputError("band_hz", f"up to {data['band_hz'][1]:g} Hz", f"at most {HIGHEST_HZ:g} Hz")
     bands = data.get("speed_bands") or []
     _at_most("speed_bands", bands, MOST_BANDS)
-    _at_most("taught_by", data.get("taught_by", []), MOST_TOLD)
+    for key in ("taught_by", "taught_recordings"):
+        _at_most(key, data.get(key, []), MOST_TOLD)
     for table in (data, *bands):
         named = {f"axes.{name}": axis for name, axis in table["axes"].items()}
         named |= {"both_planes": table["both_planes"]} if isinstance(table.get("both_planes"), dict) else {}

@@ -77,13 +77,13 @@ def idle_tip(texts: Sequence[str], units: str | None = None) -> Receptance:
     from rcsa_ident.io.frf_files import read_tap_tests
     from rcsa_ident.machine.known_tip import measured_tip
 
-    found = read_tap_tests([_source(text) for text in texts], units)
+    found = read_tap_tests([frf_source(text) for text in texts], units)
     pairs = {(Dof(a.lower()), Dof(b.lower())): curve for (a, b), curve in found.items()}
     return measured_tip({a: c for (a, b), c in pairs.items() if a is b}, {pair: c for pair, c in pairs.items() if pair[0] is not pair[1]})
 
 
-def _source(text: str) -> Any:
-    """A file, or X=FILE, XY=FILE, either with #RECORD."""
+def frf_source(text: str) -> Any:
+    """Return what a file, X=FILE or XY=FILE, each with or without #RECORD, asks to be read."""
     from rcsa_ident.io.frf_files import Source
 
     axes, sign, name = text.partition("=")

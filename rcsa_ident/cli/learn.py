@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from rcsa_ident.workflows.learn_from_cuts import Believed
 
 
+_NEW = "Cuts and taps of new toolings"
+
+
 @answers
 @takes_groups
 def learn(
@@ -31,7 +34,7 @@ def learn(
         typer.Argument(
             metavar="[RESULT.json|MODES.toml|LEARNT.json] TOOLING.toml|CAMPAIGN_DIR",
             help="What is believed before, and the tooling whose labelled cuts --tests tells (with --modes or --frf the tooling alone); "
-            "or RESULT.json and a campaign of toolings that are new to the machine, written by --toolings.",
+            "or RESULT.json and a campaign of toolings that are new to the machine (with --taps the tooling alone), written by --toolings.",
             show_default=False,
         ),
     ],
@@ -50,20 +53,31 @@ def learn(
     toolings: Annotated[
         Path | None,
         typer.Option(
-            help="Folder to write each tooling of a campaign to, under its own file name; made if it is not there.",
-            rich_help_panel="Cuts of new toolings",
+            help="Folder to write each tooling that is learned to, under its own file name; made if it is not there.",
+            rich_help_panel=_NEW,
         ),
     ] = None,
+    taps: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[X=]FILE[#RECORD]",
+            help="FRF of a hammer test at the tip of TOOLING.toml, response and force there, the spindle at standstill; one per axis. "
+            "--frf-units holds for it. A campaign tells its own as tables [[frfs]].",
+            show_default=False,
+            rich_help_panel=_NEW,
+        ),
+    ] = None,
+    sensor_mass_g: Annotated[
+        float, typer.Option(min=0.0, max=1000.0, help="Mass of the sensor that was fixed to the tip [g].", rich_help_panel=_NEW)
+    ] = 0.0,
     machine: Annotated[
         Path | None,
         typer.Option(
             help="RESULT.json to write of the machine as these cuts teach it, too: it and the toolings belong together.",
-            rich_help_panel="Cuts of new toolings",
+            rich_help_panel=_NEW,
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files of these names.", rich_help_panel="Cuts of new toolings")
-    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of these names.", rich_help_panel=_NEW)] = False,
     method: Annotated[
         MethodName,
         typer.Option(help="Stability method of every draw's limits; later commands use the same one.", rich_help_panel="Speeds and method"),
@@ -75,9 +89,10 @@ def learn(
 ) -> None:
     """Learn from labelled cuts what modes and limits they leave possible, or from recorded ones what a tooling is that is new to a machine.
 
-    One stable, slow cut of a new tooling is enough; a tooling that its cuts contradict is named and not written, exit code 3.
+    One stable, slow cut of a new tooling is enough, or one hammer test of its tip along X and Y; a tooling that its cuts or taps
+    contradict is named and not written, exit code 3.
     """
-    from rcsa_ident.cli.learn_toolings import learn_from_campaign
+    from rcsa_ident.cli.learn_toolings import New, learn_from_campaign, learn_from_taps
     from rcsa_ident.io.learnt_tips import believed as told
     from rcsa_ident.io.learnt_tips import write_learnt_tip
     from rcsa_ident.io.tested_cuts import read_tested_cuts, unused_columns
@@ -88,8 +103,14 @@ def learn(
         if tests is not None or len(files) != 2:
             found = "--tests, too" if tests is not None else f"{len(files)} files"
             raise InputError("--toolings", found, "RESULT.json and the folder of a campaign, without --tests")
-        learn_from_campaign(files[0], files[1], toolings, machine, overwrite, processes, json_)
+        new = New(toolings, machine, overwrite, json_)
+        if taps:
+            learn_from_taps(files[0], files[1], taps, tip.frf_units, 1e-3 * sensor_mass_g, new)
+        else:
+            learn_from_campaign(files[0], files[1], new, processes)
         return
+    if taps:
+        raise InputError("--taps", "no --toolings", "with --toolings, a folder to write the tooling to that they teach")
     if tests is None or out is None:
         missing = "--tests" if tests is None else "--out"
         raise InputError(missing, "nothing", "--tests and --out for labelled cuts, or --toolings for a campaign of new toolings")

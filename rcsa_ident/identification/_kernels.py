@@ -57,7 +57,8 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder,
 
     The gradient's columns: log omega_n (m), psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3),
     of each other place psi's column (m) and its residual (2), with six of the joint what standing still changes (2), with softening
-    its lower triangle by rows, joint (4); where it has five more, A22's tt, tr, rr and A21 e0's t, r.
+    its lower triangle by rows, joint (4); where it has six more, A22's tt, tr, rr, A21 e0's t, r and c, where all points of the tool-holder
+    are the tip: b = -A21 e0 changes with the latter two.
     """
     m = omega_n.size
     outputs, places = shares.shape[0], shares.shape[1] - 1
@@ -192,8 +193,9 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder,
                 row[k] = -y0 * x0
                 row[k + 1] = -y0 * x1 - y1 * x0
                 row[k + 2] = -y1 * x1
-                row[k + 3] = y0
-                row[k + 4] = y1
+                row[k + 3] = y0 - (1.0 - own) * x0
+                row[k + 4] = y1 - (1.0 - own) * x1
+                row[k + 5] = 1.0 - own
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -11,7 +11,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
-from rcsa_ident.identification.rough_toolings import RoughLines
+from rcsa_ident.identification.rough_toolings import RoughLines, placed
 from rcsa_ident.signals.motion import FLANGE_ALONE, ONE_PLACE, searched, usual_shares
 from rcsa_ident.tool_holder.drawings import RoughToolings
 from rcsa_ident.tool_holder.rough import RoughToolHolder
@@ -313,7 +313,8 @@ class IdentificationData:
         if self.rough is None:
             return None
         points = [(axis.omega, self.cut_tooling[axis.cut]) for axis in self.axes]
-        return RoughLines(self.rough, self.rough_holders, points, LEVER, self.rough_first)
+        hit = {int(t) for t in self.cut_tooling[self.cuts :]}
+        return RoughLines(self.rough, self.rough_holders, points, LEVER, self.rough_first, hit)
 
     def with_unknowns(self, spread: tuple[float, ...], slopes: Sequence[FloatArray] | Sequence[ComplexArray] | None) -> IdentificationData:
         """Return the same data with further unknowns behind the coefficients.
@@ -339,10 +340,10 @@ class IdentificationData:
         assert lines is not None
         axes = []
         for axis, toolings in zip(self.axes, lines.at(values, False), strict=True):
-            flange, tip = axis.flange.copy(), axis.tip.copy()
-            for each in toolings:
-                flange[each.points], tip[each.points] = each.values[:, :3], each.values[:, 3:]
-            axes.append(replace(axis, flange=flange, tip=tip))
+            hit = axis.on_holder if axis.on_holder.size else np.zeros(axis.omega.size, dtype=bool)
+            holder = placed(axis.kernel_holder, toolings, hit)
+            point = holder[:, 5:] if axis.point.size else axis.point
+            axes.append(replace(axis, flange=holder[:, :3], tip=holder[:, 3:5], point=point))
         return replace(self, axes=tuple(axes), rough_start=values)
 
     def as_drawn(self) -> IdentificationData:

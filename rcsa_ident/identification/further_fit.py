@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,8 +15,10 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import SMOOTH_ERROR
 from rcsa_ident.identification.known_machine import FurtherMisfit, Gaussian, KnownMachine
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.model_order import cut_weights, evidence, model_error
-from rcsa_ident.identification.parameters import JOINT, Layout
+from rcsa_ident.identification.model_order import OUTLYING, cut_weights, evidence, model_error
+from rcsa_ident.identification.parameters import JOINT, Layout, planes
+from rcsa_ident.tool_holder.alteration import ALTERATIONS
+from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 
 #: Logarithms of contact stiffnesses at which fits start: errors of a tip by a third and more are far from linear.
 STARTS = (-0.6, 0.0, 0.6)
@@ -23,8 +26,8 @@ STARTS = (-0.6, 0.0, 0.6)
 COARSE = 0.1
 #: Least model error that is believed of a few lines: they learn it badly.
 LEAST = 0.01
-#: Fits and estimates of the model error in turns.
-ROUNDS = 4
+#: Fits and estimates of the model error in turns, and steps of each.
+ROUNDS, STEPS = 4, 300
 _STIFFNESSES = ("translational_stiffness", "rotational_stiffness")
 
 
@@ -75,9 +78,10 @@ class FurtherFit:
         return self.covariance_of_all[np.ix_(self.entries, self.entries)]
 
     def contradicting(self) -> list[str]:
-        """Return the cuts that miss the answer by far more than most do."""
+        """Return the cuts that miss the answer by far more than most do, and hits of a tip that miss it so beside cuts."""
         weight = cut_weights(self.solution, self.misfit)
-        return [name for name, each in zip(self.data.cut_ids, weight, strict=True) if each < 1.0]
+        most = np.where(np.arange(weight.size) < self.data.cuts, 1.0, 1.0 / OUTLYING)
+        return [name for name, each, limit in zip(self.data.cut_ids, weight, most, strict=True) if each < limit]
 
     def surprise(self, tooling: int) -> float:
         """Return by how many standard deviations what a tooling's drawing did not tell has moved, at most."""
@@ -87,37 +91,77 @@ class FurtherFit:
         moved = np.abs(self.values - centre) / np.sqrt(np.diag(covariance))
         return float(np.max(moved[own]))
 
-    def machine(self, known: KnownMachine) -> KnownMachine:
-        """Return the machine, and what was known of earlier toolings, with what these cuts tell of them.
+    def machine(self, known: KnownMachine, names: Sequence[str]) -> KnownMachine:
+        """Return the machine, and what is known of toolings, with what these cuts tell of them.
 
         Of earlier toolings that have nothing in common with these ones, v, the machine's change tells by what they had in common with
-        it, m: v + K dm with K = cov(v, m) cov(m)^-1, and cov(v) - K (cov(m) - cov'(m)) K^T.
+        it, m: v + K dm with K = cov(v, m) cov(m)^-1, and cov(v) - K (cov(m) - cov'(m)) K^T. Of these cuts' own toolings it holds how they
+        differ from what was learned of them: contact and section, hardly told apart, are known well together.
+
+        Parameters
+        ----------
+        known : KnownMachine
+        names : sequence of str
+            Of the toolings of these cuts.
         """
-        layout, theta, covariance = self.solution.layout, self.solution.theta, self.covariance_of_all
-        size, told = layout.tail + JOINT, [] if known.toolings is None else list(known.toolings.unknowns)
+        layout, theta, covariance = planes(self.solution.layout), self.solution.theta, self.covariance_of_all
+        machine = known.places(layout)
+        size = machine.size
         before = known.joint_covariance(self.data)
-        entries, unit = known.entries(self.data, size)
-        ours = np.r_[np.arange(size), entries[entries >= 0]]
+        entries, unit = known.entries(self.data, layout.force.start)
+        ours = np.r_[machine, entries[entries >= 0]]
         scale = np.concatenate([np.ones(size), unit[entries >= 0]])
         places = np.r_[np.arange(size), size + np.flatnonzero(entries >= 0)]
         after = covariance[np.ix_(ours, ours)] / np.outer(scale, scale)
         gain = np.linalg.solve(before[np.ix_(places, places)], before[places]).T
         whole = before - gain @ (before[np.ix_(places, places)] - after) @ gain.T
-        whole = 0.5 * (whole + whole.T)
         moved = gain @ ((theta - self.known.centre)[ours] / scale)
-        toolings = None
-        if known.toolings is not None:
-            own = whole[size:, size:]
-            toolings = replace(known.toolings, mean=known.toolings.mean + moved[size:], covariance=own)
-        found = {}
+        unknowns, spread, shares = self._own_toolings(names)
+        cross = gain @ (covariance[np.ix_(ours, self.entries)] / scale[:, None]) @ shares.T
+        whole = np.block([[whole, cross], [cross.T, shares @ self.covariance @ shares.T]])
+        toolings = known.toolings or KnownToolings((), np.zeros(0), np.zeros(0), np.zeros((0, 0)), ())
+        # what was learned of a tooling before is in what was learned now
+        kept = [k for k, each in enumerate(toolings.unknowns) if each.kind != "tooling" or each.owner not in names]
+        tail = np.r_[size + np.array(kept, dtype=np.intp), np.arange(before.shape[0], whole.shape[0])]
+        whole = 0.5 * (whole + whole.T)
+        taught = KnownToolings(
+            (*(toolings.unknowns[k] for k in kept), *unknowns),
+            np.concatenate([toolings.spread[kept], spread]),
+            np.concatenate([(toolings.mean + moved[size:])[kept], np.zeros(len(unknowns))]),
+            whole[np.ix_(tail, tail)],
+            toolings.toolings,
+        )
+        found, first = {}, 0
         for i, axis in enumerate(self.data.axes):
-            part, old = layout.axis(i), known.posteriors[axis.axis]
-            here = np.r_[np.arange(part.start, part.stop), np.arange(layout.tail, size)]
-            shift = moved[here]
-            rivals = tuple(rival + shift if rival.size == shift.size else rival for rival in old.rivals)
-            cross = {} if not told else {"tooling_cross": whole[here, size:], "tooling_covariance": whole[size:, size:]}
-            found[axis.axis] = replace(old, theta=theta[here], covariance=whole[np.ix_(here, here)], rivals=rivals, **cross)
-        return KnownMachine({**known.posteriors, **found}, toolings)
+            old = known.posteriors[axis.axis]
+            core = layout.axes[i].machine.size
+            here = np.r_[np.arange(first, first + core), np.arange(size - JOINT, size)]
+            first += core
+            found[axis.axis] = replace(
+                old,
+                theta=theta[machine[here]],
+                covariance=whole[np.ix_(here, here)],
+                # how far they were away was asked before these cuts, which have ruled out much of it
+                rivals=(),
+                tooling_cross=whole[np.ix_(here, tail)],
+                tooling_covariance=taught.covariance,
+                rival_toolings=(),
+            )
+        return KnownMachine({**known.posteriors, **found}, taught)
+
+    def _own_toolings(self, names: Sequence[str]) -> tuple[list[RoughUnknown], FloatArray, FloatArray]:
+        """Numbers of the drawings of these cuts, their standard deviations before, and how those of the fit add up to them."""
+        rough = self.data.rough
+        assert rough is not None
+        unknowns, rows = [], []
+        for name, weights in zip(names, rough.weights * rough.spread, strict=True):
+            for field, row in zip(ALTERATIONS, weights, strict=True):
+                if np.any(row):
+                    unknowns.append(RoughUnknown(field, name, "tooling"))
+                    rows.append(row)
+        shares = np.array(rows)
+        spread = np.sqrt(np.einsum("fu,uv,fv->f", shares, self.before[1], shares))
+        return unknowns, spread, shares / spread[:, None]
 
 
 def fit_further(data: IdentificationData, machine: KnownMachine, reclamped: float) -> FurtherFit:
@@ -135,17 +179,42 @@ def fit_further(data: IdentificationData, machine: KnownMachine, reclamped: floa
         raise InputError("toolings", "drawings that are exact", "toolings with a [spread] table: nothing of others is to be learned")
     rough, data = data.rough, data.summed().with_smooth_errors(SMOOTH_ERROR)
     known, layout = machine.prior(data, reclamped), machine.layout(data)
+    stills = machine.standstills(data)
+    frame = _Frame(machine, known, layout, float(np.mean(stills)))
     values = known.centre[layout.force][data.rough_place].copy()
-    nuisance = np.zeros((len(data.cut_ids), 2))
+    theta, nuisance = known.centre, np.zeros((len(data.cut_ids), 2))
     for tooling in range(len(data.toolings)):
         own = np.flatnonzero(data.cut_tooling == tooling)
-        part = data.of_cuts(own)
-        fits = [_fit(part, machine, known, layout, start, nuisance[own], COARSE) for start in _starts(data, tooling, values)]
-        best = min(fits, key=lambda fit: evidence(fit.solution, fit.misfit))
+        part = _of(data, own)
+        fits = [_fit(part, frame, known.centre, start, nuisance[own], COARSE) for start in _starts(data, tooling, values)]
+        best = min(fits, key=_evidence)
         nuisance[own] = best.solution.evaluation.nuisance
         told = np.any(rough.weights[tooling], axis=0)
         values[told] = best.values[told]
-    return _fit(data, machine, known, layout, values, nuisance, None)
+        theta = best.solution.theta
+    # of several toolings each has moved the machine its own way
+    theta = theta if len(data.toolings) == 1 else known.centre
+    return min((_fit(data, replace(frame, still=still), theta, values, nuisance, None) for still in stills), key=_evidence)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frame:
+    """What all fits have in common: the machine, what is known, the unknowns, and where a spindle that stands still counts."""
+
+    machine: KnownMachine
+    known: Gaussian
+    layout: Layout
+    still: float
+
+
+def _evidence(fit: FurtherFit) -> float:
+    return evidence(fit.solution, fit.misfit)
+
+
+def _of(data: IdentificationData, keep: np.ndarray) -> IdentificationData:
+    """The same data with some of the cuts and hits."""
+    tests = tuple(data.tests[k - data.cuts] for k in keep.tolist() if k >= data.cuts)
+    return replace(data.of_cuts(keep), tests=tests)
 
 
 def _starts(data: IdentificationData, tooling: int, values: FloatArray) -> list[FloatArray]:
@@ -163,30 +232,27 @@ def _starts(data: IdentificationData, tooling: int, values: FloatArray) -> list[
 
 
 def _fit(
-    data: IdentificationData,
-    machine: KnownMachine,
-    known: Gaussian,
-    layout: Layout,
-    values: FloatArray,
-    nuisance: FloatArray,
-    coarse: float | None,
+    data: IdentificationData, frame: _Frame, start: FloatArray, values: FloatArray, nuisance: FloatArray, coarse: float | None
 ) -> FurtherFit:
-    """The fit from values of what the drawings do not tell; coarse to fine where a coarse model error is given."""
-    theta = known.centre.copy()
-    place = data.rough_place
+    """The fit from a vector with other values of what the drawings do not tell; coarse to fine where a coarse model error is given."""
+    theta, layout, place = start.copy(), frame.layout, data.rough_place
+
+    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> FurtherMisfit:
+        return FurtherMisfit(data, frame.machine, frame.known, shares, weight, frame.still)
+
     theta[layout.force.start + place.start : layout.force.start + place.stop] = values
     grid = 0 if coarse is None else 32
     shares = ((LEAST if coarse is None else coarse),) * len(data.axes)
     weight = np.ones(len(data.cut_ids))
     if coarse is not None:
-        rough = refine(FurtherMisfit(data, machine, known, shares, weight), theta, layout, nuisance, 60, grid=grid)
+        rough = refine(misfit_of(shares, weight), theta, layout, nuisance, 60, grid=grid)
         theta, nuisance, shares = rough.theta, rough.evaluation.nuisance, (LEAST,) * len(data.axes)
     for _ in range(ROUNDS):
-        misfit = FurtherMisfit(data, machine, known, shares, weight)
-        found = refine(misfit, theta, layout, nuisance, 100, grid=grid)
+        misfit = misfit_of(shares, weight)
+        found = refine(misfit, theta, layout, nuisance, STEPS, grid=grid)
         learned = tuple(max(each, LEAST) for each in model_error(found, misfit))
         theta, nuisance = found.theta, found.evaluation.nuisance
         if all(abs(a / b - 1.0) < 0.05 for a, b in zip(learned, shares, strict=True)):
             break
         shares, weight = learned, cut_weights(found, misfit)
-    return FurtherFit(data, known, found, misfit)
+    return FurtherFit(data, frame.known, found, misfit)

@@ -144,6 +144,17 @@ def _wider(axis: AxisData, count: int, hit: bool) -> AxisData:
     return own.summed() if hit else own
 
 
+def _cuts_alone(parts: Sequence[AxisData]) -> dict[str, np.ndarray]:
+    """What a cut's lines feel of the other axis, where they do: a hammer's hit along one of them alone."""
+    found = {}
+    for name in ("beside", "talk"):
+        values = [getattr(part, name) for part in parts]
+        shape = next((each.shape[1:] for each in values if each.size), None)
+        if shape is not None:
+            found[name] = np.concatenate([v if v.size else np.zeros((p.omega.size, *shape)) for v, p in zip(values, parts, strict=True)])
+    return found
+
+
 def _swept(parts: Sequence[AxisData]) -> dict[str, np.ndarray]:
     """How the lines sweep, where some do; a hammer's do not."""
     if not any(part.sweep.size for part in parts):
@@ -176,5 +187,6 @@ def _joined(parts: Sequence[AxisData]) -> AxisData:
         on_holder=whole(lambda p: p.on_holder if p.on_holder.size else np.zeros(p.omega.size, dtype=bool)),
         still=whole(lambda p: p.still if p.still.size else np.zeros(p.omega.size, dtype=bool)),
         point=whole(lambda p: p.point if p.point.size else np.zeros((p.omega.size, 3))),
+        **_cuts_alone(parts),
         **_swept(parts),
     )

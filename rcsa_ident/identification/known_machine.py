@@ -72,11 +72,28 @@ class KnownMachine:
         """Middle of the earlier cuts' speeds and half their range [rad/s]."""
         return next(iter(self.posteriors.values())).speed_range
 
-    def relative(self, speed: FloatArray) -> FloatArray:
-        """Return where speeds [rad/s] lie among the earlier cuts', -1 to 1: beyond them the machine stays as it is at their ends."""
+    def relative(self, speed: FloatArray, still: float = -1.0) -> FloatArray:
+        """Return where speeds [rad/s] lie among the earlier cuts', -1 to 1: beyond them the machine stays as it is at their ends.
+
+        Parameters
+        ----------
+        speed : array, shape (k,) [rad/s]
+        still : float
+            Where a spindle counts that stands still.
+        """
         middle, half = self.speed_range
-        found: FloatArray = np.clip((speed - middle) / half, -1.0, 1.0) if half else np.zeros(speed.size)
-        return found
+        if not half:
+            return np.zeros(speed.size)
+        return np.where(speed == 0.0, still, np.clip((speed - middle) / half, -1.0, 1.0))
+
+    def standstills(self, data: IdentificationData) -> tuple[float, ...]:
+        """Return where a spindle that stands still may count among the earlier cuts' speeds, where some of the lines are such a one's.
+
+        As at the slowest of them, or as far along the straight line that they showed.
+        """
+        middle, half = self.speed_range
+        softens = half > 0.0 and any(posterior.layout.softening for posterior in self.posteriors.values())
+        return (-1.0, -middle / half) if softens and middle > half and any(np.any(axis.still) for axis in data.axes) else (-1.0,)
 
     def layout(self, data: IdentificationData) -> Layout:
         """Return the unknowns of further cuts.
@@ -91,8 +108,16 @@ class KnownMachine:
             if axis.axis not in self.posteriors:
                 told = ", ".join(known.upper() for known in self.posteriors)
                 raise InputError("axes", f"cuts that show {axis.axis.upper()}", f"what the machine is known along: {told}")
-            axes.append(AxisLayout(self.posteriors[axis.axis].layout.modes, softening=self.posteriors[axis.axis].layout.softening))
+            known = self.posteriors[axis.axis].layout
+            # a machine that was found while it turned may be another one at standstill
+            still = bool(self.speed_range[0]) and bool(np.any(axis.still))
+            axes.append(AxisLayout(known.modes, softening=known.softening, standstill=still))
         return Layout(tuple(axes), len(data.coefficient_spread))
+
+    def places(self, layout: Layout) -> np.ndarray:
+        """Return where the axes' machines and the joint stand in the vector of further cuts, in the order of `joint_covariance`."""
+        found = [layout.axis(i).start + axis.machine for i, axis in enumerate(layout.axes)]
+        return np.concatenate([*found, np.arange(layout.joint.start, layout.joint.stop)])
 
     def joint_covariance(self, data: IdentificationData) -> FloatArray:
         """Return the covariance of the axes' machines, the joint and the earlier toolings together, in this order.
@@ -149,6 +174,8 @@ class KnownMachine:
     def prior(self, data: IdentificationData, reclamped: float) -> Gaussian:
         """Return what is known before further cuts: of the machine and of models by the earlier ones, of all else by itself.
 
+        Joint stiffnesses of a further clamping differ; what standing still changes is known as before an identification.
+
         Parameters
         ----------
         data : IdentificationData
@@ -156,21 +183,27 @@ class KnownMachine:
             Standard deviation by which the joint's stiffnesses differ in a further clamping: of their logarithms.
         """
         known = [self.posteriors[axis.axis] for axis in data.axes]
-        joint = np.mean([each.theta[-JOINT:] for each in known], axis=0)
-        centre = np.concatenate([*(each.theta[:-JOINT] for each in known), joint, np.zeros(len(data.coefficient_spread))])
-        size = centre.size - len(data.coefficient_spread)
+        layout = self.layout(data)
+        machine, size = self.places(layout), self.places(layout).size
+        centre, found = np.zeros(layout.size), np.zeros((layout.size, layout.size))
+        centre[machine] = np.concatenate([*(each.theta[:-JOINT] for each in known), np.mean([k.theta[-JOINT:] for k in known], axis=0)])
         covariance = self.joint_covariance(data)
-        found = np.diag(np.concatenate([np.zeros(size), np.square(data.coefficient_spread)]))
-        found[:size, :size] = covariance[:size, :size]
-        found[range(size - JOINT, size - JOINT + 2), range(size - JOINT, size - JOINT + 2)] += reclamped**2
-        entries, unit = self.entries(data, size)
+        found[np.ix_(machine, machine)] = covariance[:size, :size]
+        stiffnesses = layout.joint.start + np.arange(2)
+        found[stiffnesses, stiffnesses] += reclamped**2
+        force = np.arange(layout.force.start, layout.force.stop)
+        found[force, force] = np.square(data.coefficient_spread)
+        for i, axis in enumerate(layout.axes):
+            still = layout.axis(i).start + np.arange(axis.size)[axis.still]
+            found[still, still] = np.square(Priors().standstill)[: still.size]
+        entries, unit = self.entries(data, layout.force.start)
         if self.toolings is not None and np.any(entries >= 0):
             here, own = entries[entries >= 0], np.flatnonzero(entries >= 0)
             unit = unit[own]
             centre[here] = unit * self.toolings.mean[own]
             found[np.ix_(here, here)] = unit[:, None] * covariance[np.ix_(size + own, size + own)] * unit
-            found[:size, here] = covariance[:size, size + own] * unit
-            found[here, :size] = found[:size, here].T
+            found[np.ix_(machine, here)] = covariance[:size, size + own] * unit
+            found[np.ix_(here, machine)] = found[np.ix_(machine, here)].T
         return Gaussian(centre, found)
 
 
@@ -185,6 +218,8 @@ class FurtherMisfit(Misfit):
         As the machine's `prior` returns it.
     model_error : tuple of float [-]
     cut_weight : array, shape (k,), optional
+    still : float
+        As in `KnownMachine.relative`.
     """
 
     def __init__(
@@ -194,14 +229,15 @@ class FurtherMisfit(Misfit):
         known: Gaussian,
         model_error: tuple[float, ...],
         cut_weight: FloatArray | None = None,
+        still: float = -1.0,
     ) -> None:
-        self._machine, self._known = machine, known
+        self._machine, self._known, self._still = machine, known, still
         super().__init__(data, Priors(), model_error, cut_weight)
 
     @property
     def relative_speed(self) -> FloatArray:
         """Spindle speed of each cut within those of the earlier ones, from -1 to 1, shape (k,) [-]."""
-        return self._machine.relative(self.data.spindle_speed)
+        return self._machine.relative(self.data.spindle_speed, self._still)
 
     def prior(self, layout: Unknowns) -> Known:
         """Return what was known before."""

@@ -25,10 +25,10 @@ from rcsa_ident.identification.parameters import (
     unpack,
 )
 from rcsa_ident.identification.priors import Known, Priors, prior_rows
-from rcsa_ident.identification.rough_toolings import ToolingAt
+from rcsa_ident.identification.rough_toolings import ToolingAt, placed
 
-#: Entries of a tool-holder that a line feels: the flange's tt, tr, rr, and flange over tip t, r.
-HOLDER = 5
+#: Entries of a tool-holder that a line feels: the flange's tt, tr, rr, flange over tip t, r, and where the tip was hit the tip's own.
+HOLDER = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -349,10 +349,7 @@ class WeightedLines:
 
     def with_toolings(self, toolings: Sequence[ToolingAt]) -> ComplexArray:
         """The tool-holders' receptances with those of rough toolings in place of the drawn ones, shape (n, 8)."""
-        holder = self.holder.copy()
-        for each in toolings:
-            holder[each.points, :HOLDER] = each.values
-        return holder
+        return placed(self.holder, toolings, self.points[:, 2] == 0.0)
 
     def force(self, logs: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """What the forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c)."""
@@ -371,7 +368,7 @@ class WeightedLines:
         out = np.empty((2 * rows.shape[0], scale.size + slope.shape[1]))
         whiten(rows, np.repeat(slope, self.outputs, axis=0), model.ravel(), self.weight, scale, out)
         for each in toolings:
-            change = -(gradient[each.points, :, scale.size :] @ each.slopes)
+            change = -(gradient[each.points, :, scale.size : scale.size + each.values.shape[1]] @ each.slopes)
             lines = (each.points[:, None] * self.outputs + np.arange(self.outputs)).ravel()
             change = change.reshape(lines.size, -1) * self._root[lines, None]
             columns = scale.size + each.unknowns

@@ -83,6 +83,16 @@ def with_cross_talk(data: IdentificationData, spread: FloatArray) -> Identificat
     return replace(data, axes=tuple(axes), talk_place=felt).with_unknowns(more, None)
 
 
+def with_rough_forces(data: IdentificationData) -> IdentificationData:
+    """Return the same data whose forces are known no better than tools: an error of depth, edge or run-out is a share of the whole force.
+
+    Where little of that points along an axis, it is much of the little.
+    """
+    told = [axis.across.size > 0 and not axis.beside.size for axis in data.axes]
+    beside = [replace(a, beside=(a.power.T * np.abs(a.across / a.force) ** 2).T) if t else a for a, t in zip(data.axes, told, strict=True)]
+    return replace(data, axes=tuple(beside))
+
+
 def with_rough_toolings(data: IdentificationData, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
     """Return the same data whose tool-holders are known only roughly.
 
@@ -94,8 +104,5 @@ def with_rough_toolings(data: IdentificationData, rough: RoughToolings, holders:
     holders : sequence of RoughToolHolder
     """
     count, first = len(rough.unknowns), len(data.coefficient_spread)
-    # who knows a tool only roughly knows its force no better: an error of depth, edge or run-out is a share of the whole force, and
-    # where little of that points along an axis, much of the little
-    axes = tuple(replace(a, beside=(a.power.T * np.abs(a.across / a.force) ** 2).T) if a.across.size else a for a in data.axes)
-    held = replace(data, axes=axes, rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
+    held = replace(with_rough_forces(data), rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
     return held.with_unknowns((1.0,) * count, None)

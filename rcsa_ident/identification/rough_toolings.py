@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,9 +19,9 @@ class ToolingAt(NamedTuple):
     Parameters
     ----------
     points : array of int, shape (k,)
-    values : complex array, shape (k, 5) [m/N]
-        Flange tt, tr, rr, flange over tip t, r, scaled by the lever.
-    slopes : complex array, shape (k, 5, m), or (0, 5, m) where nobody asked
+    values : complex array, shape (k, 5) [m/N], or (k, 6) where its tip was hit
+        Flange tt, tr, rr, flange over tip t, r, scaled by the lever, and the tip over the tip.
+    slopes : complex array, shape (k, 5, m) or (k, 6, m), no rows where nobody asked
         Their change with each of its unknowns.
     unknowns : array of int, shape (m,)
         Where these stand among the coefficients.
@@ -31,6 +31,26 @@ class ToolingAt(NamedTuple):
     values: ComplexArray
     slopes: ComplexArray
     unknowns: np.ndarray
+
+
+def placed(holder: ComplexArray, toolings: Sequence[ToolingAt], hit: np.ndarray) -> ComplexArray:
+    """Return receptances of tool-holders as the kernel takes them with those of rough toolings in place of the drawn ones, shape (n, 8).
+
+    Parameters
+    ----------
+    holder : complex array, shape (n, 8) [m/N]
+    toolings : sequence of ToolingAt
+    hit : array of bool, shape (n,)
+        Points that are a hit tip's motion.
+    """
+    found = holder.copy()
+    for each in toolings:
+        found[each.points, :5] = each.values[:, :5]
+        own = hit[each.points]
+        if np.any(own):
+            place, values = each.points[own], each.values[own]
+            found[place, 5], found[place, 6:] = values[:, 5], -values[:, 3:5]
+    return found
 
 
 class _Asked(NamedTuple):
@@ -44,6 +64,7 @@ class _Asked(NamedTuple):
     omega: FloatArray
     points: list[np.ndarray]
     places: list[np.ndarray]
+    tip: bool
 
 
 class RoughLines:
@@ -59,6 +80,8 @@ class RoughLines:
     lever : float [m]
     first : int
         Where their unknowns begin among the coefficients.
+    hit : collection of int
+        Toolings whose tip was hit: its own receptance is among their lines.
     """
 
     def __init__(
@@ -68,6 +91,7 @@ class RoughLines:
         points: Sequence[tuple[FloatArray, np.ndarray]],
         lever: float,
         first: int,
+        hit: Collection[int] = (),
     ) -> None:
         self.toolings, self._lever, self._first = toolings, lever, first
         self._axes = len(points)
@@ -82,7 +106,7 @@ class RoughLines:
             rows = toolings.weights[t, [ALTERATIONS.index(f) for f in fields]] * toolings.spread
             members = np.flatnonzero(np.any(rows, axis=0))
             places = [np.searchsorted(omega, w) for w in asked]
-            self._asked.append(_Asked(t, holder, fields, rows[:, members], members, omega, own, places))
+            self._asked.append(_Asked(t, holder, fields, rows[:, members], members, omega, own, places, t in hit))
 
     def at(self, values: FloatArray, slopes: bool) -> list[list[ToolingAt]]:
         """Return each axis' rough toolings.
@@ -96,7 +120,7 @@ class RoughLines:
         found: list[list[ToolingAt]] = [[] for _ in range(self._axes)]
         for each in self._asked:
             by = self.toolings.alteration(each.tooling, values)
-            receptances, changes = each.holder.receptances(by, each.omega, self._lever, each.fields if slopes else ())
+            receptances, changes = each.holder.receptances(by, each.omega, self._lever, each.fields if slopes else (), each.tip)
             # from fields to the unknowns that add up to them
             turned = changes @ each.rows if slopes else np.empty((0, receptances.shape[1], each.members.size), dtype=complex)
             for axis, points, place in zip(found, each.points, each.places, strict=True):

@@ -85,7 +85,7 @@ def known_toolings_of(table: Table) -> KnownToolings:
         mean.append(row.number(f"found_{unit}", unit) / wide)
     covariance = matrix_of(table, "covariance", (len(unknowns), len(unknowns)))
     return KnownToolings(
-        tuple(unknowns), np.array(spread), np.array(mean), covariance, tuple(table.texts("cut", "names of toolings", True))
+        tuple(unknowns), np.array(spread), np.array(mean), covariance, tuple(table.texts("cut", "names of toolings", False))
     )
 
 

@@ -150,7 +150,7 @@ def check_result(data: Any, where: str) -> None:
     # hammer tests alone cut nothing
     if "workpiece" in top or top.table("campaign").data.get("cuts_used") != 0:
         workpiece_of(top.table("workpiece"))
-    for key in ("notes", "taught_by"):
+    for key in ("notes", "taught_by", "taught_recordings"):
         if key in top:
             _texts(top, key)
     low, high = top.numbers("band_hz", 2, "Hz")

@@ -15,7 +15,7 @@ LANES = 32
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def reduced_receptances(matrices, loads, omega, changes, values, slopes):
-    """Fill `values` (n, 5) with the receptances between flange and tip and, if it has rows, `slopes` (n, 5, u) with their changes.
+    """Fill `values` (n, p) with the receptances between flange and tip and, if it has rows, `slopes` (n, p, u) with their changes.
 
     D x_b = f_b with D = K - w^2 M + i (S + w C), and A_ab = f_a^T x_b, dA_ab = -x_a^T dD x_b, as D is symmetric. Its factor L D L^T has no
     pivots: damping keeps them from zero.
@@ -27,14 +27,14 @@ def reduced_receptances(matrices, loads, omega, changes, values, slopes):
     omega : (n,)
     changes : (u, 4, r, r) of the matrices with each unknown
 
-    Columns: flange tt, tr, rr, flange over tip t, r.
+    Columns: flange tt, tr, rr, flange over tip t, r, and where there is a sixth the tip over the tip.
     """
-    r, n, count = loads.shape[1], omega.size, changes.shape[0]
+    r, n, count, pairs = loads.shape[1], omega.size, changes.shape[0], values.shape[1]
     real, imag = np.empty((r, r, LANES)), np.empty((r, r, LANES))
     x_re, x_im = np.empty((3, r, LANES)), np.empty((3, r, LANES))
     w, t_re, t_im = np.ones(LANES), np.empty(LANES), np.empty(LANES)
     g_re, g_im = np.empty((3, LANES)), np.empty((3, LANES))
-    s_re, s_im = np.empty((5, LANES)), np.empty((5, LANES))
+    s_re, s_im = np.empty((pairs, LANES)), np.empty((pairs, LANES))
     for start in range(0, n, LANES):
         here = min(LANES, n - start)
         for f in range(LANES):
@@ -79,8 +79,8 @@ def reduced_receptances(matrices, loads, omega, changes, values, slopes):
                 for f in range(LANES):
                     x_re[b, j, f] = t_re[f] * real[j, j, f] - t_im[f] * imag[j, j, f]
                     x_im[b, j, f] = t_re[f] * imag[j, j, f] + t_im[f] * real[j, j, f]
-        for p in range(5):
-            a, b = (0, 0, 1, 0, 1)[p], (0, 1, 1, 2, 2)[p]
+        for p in range(pairs):
+            a, b = (0, 0, 1, 0, 1, 2)[p], (0, 1, 1, 2, 2, 2)[p]
             s_re[p, :] = 0.0
             s_im[p, :] = 0.0
             for i in range(r):
@@ -106,11 +106,11 @@ def reduced_receptances(matrices, loads, omega, changes, values, slopes):
                         for f in range(LANES):
                             g_re[b, f] += t_re[f] * x_re[b, j, f] - t_im[f] * x_im[b, j, f]
                             g_im[b, f] += t_re[f] * x_im[b, j, f] + t_im[f] * x_re[b, j, f]
-                for p in range(5):
-                    a, b = (0, 0, 1, 0, 1)[p], (0, 1, 1, 2, 2)[p]
+                for p in range(pairs):
+                    a, b = (0, 0, 1, 0, 1, 2)[p], (0, 1, 1, 2, 2, 2)[p]
                     for f in range(LANES):
                         s_re[p, f] += x_re[a, i, f] * g_re[b, f] - x_im[a, i, f] * g_im[b, f]
                         s_im[p, f] += x_re[a, i, f] * g_im[b, f] + x_im[a, i, f] * g_re[b, f]
-            for p in range(5):
+            for p in range(pairs):
                 for f in range(here):
                     slopes[start + f, p, u] = complex(-s_re[p, f], -s_im[p, f])

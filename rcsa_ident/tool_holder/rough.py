@@ -67,11 +67,12 @@ class RoughToolHolder:
     loads: FloatArray
 
     def receptances(
-        self, by: Alteration, omega: FloatArray, lever: float, unknowns: Sequence[str] = ()
+        self, by: Alteration, omega: FloatArray, lever: float, unknowns: Sequence[str] = (), tip: bool = False
     ) -> tuple[ComplexArray, ComplexArray]:
         """Return the free receptances of the altered assembly and their slopes, shapes (n, 5) and (n, 5, u) [m/N].
 
-        Columns: the flange's translation, translation and slope, slope; its translation and its slope per force at the tip.
+        Columns: the flange's translation, translation and slope, slope; its translation and its slope per force at the tip; where `tip` is
+        asked for a sixth, the tip's translation per force there.
 
         Parameters
         ----------
@@ -81,13 +82,15 @@ class RoughToolHolder:
             Slopes are multiplied and moments divided by it.
         unknowns : sequence of str
             Fields of `Alteration` along which slopes are told.
+        tip : bool
+            Whether the tip's own receptance is asked for, too.
         """
         shares, slopes = _shares_of(by)
         matrices = np.tensordot(shares, self.terms, axes=1)
         chosen = [ALTERATIONS.index(name) for name in unknowns]
         changes = np.tensordot(slopes[:, chosen].T, self.terms, axes=1)
-        values = np.empty((omega.size, 5), dtype=complex)
-        found = np.empty((omega.size if chosen else 0, 5, len(chosen)), dtype=complex)
+        values = np.empty((omega.size, 6 if tip else 5), dtype=complex)
+        found = np.empty((omega.size if chosen else 0, values.shape[1], len(chosen)), dtype=complex)
         loads = self.loads * np.array([[1.0], [lever], [1.0]])
         reduced_receptances(matrices, loads, np.ascontiguousarray(omega), changes, values, found)
         return values, found

@@ -15,15 +15,15 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.cut_data import prepare
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.hammer_data import with_tests
+from rcsa_ident.identification.hammer_data import AtPoints, with_tests
 from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines, noise_of, thinned
 from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification, IdentificationCode
-from rcsa_ident.identification.rough_data import with_corners, with_cross_talk, with_rough_toolings, with_scales
+from rcsa_ident.identification.rough_data import with_corners, with_cross_talk, with_rough_forces, with_rough_toolings, with_scales
 from rcsa_ident.identification.workpiece_side import workpiece_side
-from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
+from rcsa_ident.machining_setup import Campaign, Cut, HammerTest, Tooling
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
@@ -269,15 +269,24 @@ def _mode_deviation(
     return deviation(frequency), deviation(damping)
 
 
-def data_of(
-    campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = (), known: KnownToolings | None = None
-) -> IdentificationData:
-    """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them."""
+def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = ()) -> IdentificationData:
+    """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them, which take these as drawn."""
     if not tests:
-        return with_rough(_data_of_cuts(campaign, readings), campaign, known)
-    at_points = {name: partial(receptance_at_points, t.assembly) for name, t in campaign.toolings.items()}
+        return with_rough(_data_of_cuts(campaign, readings), campaign)
     usable = any(bool(each.measurements) for each in readings)
-    return with_tests(_data_of_cuts(campaign, readings) if usable else None, tests, at_points)
+    return with_tests(_data_of_cuts(campaign, readings) if usable else None, tests, _at_points(campaign))
+
+
+def data_to_learn_from(
+    campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines], known: KnownToolings | None
+) -> IdentificationData:
+    """Return usable cuts and hits of the tip as what they tell of toolings that are known as well as drawings and earlier cuts say."""
+    usable = any(bool(each.measurements) for each in readings) or not tests
+    return with_rough(_data_of_cuts(campaign, readings) if usable else None, campaign, known, tests)
+
+
+def _at_points(campaign: Campaign) -> dict[str, AtPoints]:
+    return {name: partial(receptance_at_points, t.assembly) for name, t in campaign.toolings.items()}
 
 
 def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationData:
@@ -295,12 +304,41 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     return replace(data, softening_spread=campaign.softening_spread)
 
 
-def with_rough(data: IdentificationData, campaign: Campaign, known: KnownToolings | None = None) -> IdentificationData:
-    """Return the data whose tool-holders, depths and sensors are known as well as drawings, earlier cuts and campaign say."""
-    drawn = [campaign.toolings[name] for name in data.toolings]
-    # what a sweep does to a line is taken out by the drawn tool-holder's receptances around it
-    if all(t.spread.exact for t in drawn) or data.sweeps:
+def with_rough(
+    data: IdentificationData | None, campaign: Campaign, known: KnownToolings | None = None, tests: Sequence[HammerLines] = ()
+) -> IdentificationData:
+    """Return the data whose tool-holders, depths and sensors are known as well as drawings, earlier cuts and campaign say.
+
+    Parameters
+    ----------
+    data : IdentificationData or None
+        Of cuts; None where there are hits of the tip alone.
+    campaign : Campaign
+    known : KnownToolings, optional
+        What earlier cuts have told.
+    tests : sequence of HammerLines
+        Hits of the tip, behind the cuts.
+    """
+    names = dict.fromkeys([*(() if data is None else data.toolings), *(test.tooling for test in tests)])
+    drawn = [campaign.toolings[name] for name in names]
+    rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
+    if data is not None:
+        # what a sweep does to a line is taken out by the drawn tool-holder's receptances around it
+        if data.sweeps or (rough is None and not any(_corner_owner(t) for t in drawn)):
+            return data
+        data = _with_rough_cuts(data, campaign)
+    if tests:
+        data = with_tests(data, tests, _at_points(campaign))
+    assert data is not None
+    if rough is None:
+        # a corner radius is no part of a tool-holder
         return data
+    highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
+    return with_rough_toolings(data, rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
+
+
+def _with_rough_cuts(data: IdentificationData, campaign: Campaign) -> IdentificationData:
+    """The data of cuts whose depths, corner radii and sensors are known as well as the campaign says."""
     depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]
     shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
     sensors = [shown.get(axis.axis) for axis in data.axes]
@@ -310,19 +348,13 @@ def with_rough(data: IdentificationData, campaign: Campaign, known: KnownTooling
         for name in ("gain_spread", "cross_talk_spread", "delay_spread")
     )
     data = with_scales(data, campaign.depth_spread / np.array(depths), gain, delay)
-    data = with_cross_talk(with_corners(data, *_corners(data, campaign)), talk)
-    rough = rough_toolings({t.name: t.drawing for t in drawn}, known)
-    if rough is None:
-        # a corner radius is no part of a tool-holder
-        return data
-    highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
-    return with_rough_toolings(data, rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
+    return with_rough_forces(with_cross_talk(with_corners(data, *_corners(data, campaign)), talk))
 
 
 def _corners(data: IdentificationData, campaign: Campaign) -> tuple[list[str], list[ComplexArray]]:
     """Whose corner radii are not known exactly, tooling by tooling, and what they do to the force in the lines of each axis."""
     drawn = [campaign.toolings[name] for name in data.toolings]
-    owners = [(t.tool_model or t.name) if t.spread.corner_radius > 0.0 and has_corner(t.cutter) else "" for t in drawn]
+    owners = [_corner_owner(t) for t in drawn]
     conditions = {cut.id: cut.conditions for cut in campaign.cuts}
     changes = [np.zeros(axis.omega.size, dtype=complex) for axis in data.axes]
     for axis, change in zip(data.axes, changes, strict=True):
@@ -334,6 +366,12 @@ def _corners(data: IdentificationData, campaign: Campaign) -> tuple[list[str], l
                 ratio = corner_change(cutter, conditions[data.cut_ids[k]], campaign.coefficients, axis.order[own], wider)
                 change[own] = ratio[:, 0 if axis.axis is Dof.X else 1]
     return owners, changes
+
+
+def _corner_owner(tooling: Tooling) -> str:
+    """Whose corner radius it is, tool model or tooling; empty where it is known exactly."""
+    rough = tooling.spread.corner_radius > 0.0 and has_corner(tooling.cutter)
+    return (tooling.tool_model or tooling.name) if rough else ""
 
 
 def _turning(campaign: Campaign, name: str, omega: FloatArray, ratio: FloatArray) -> tuple[ComplexArray, ComplexArray]:

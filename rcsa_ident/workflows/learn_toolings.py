@@ -1,31 +1,34 @@
-"""One cut of a new tool: what further cuts of a machine that is known tell of the toolings that they were made with."""
+"""One cut or one tap of a new tool: what further cuts and hits of a machine that is known tell of the toolings that were clamped."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.further_fit import FurtherFit, fit_further
+from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines
 from rcsa_ident.identification.known_machine import KnownMachine
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.machining_setup import Campaign, Tooling
+from rcsa_ident.machining_setup import Campaign, HammerTest, Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered, fluted_segments
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.spread import SPREAD_FIELDS
-from rcsa_ident.units import to_rpm
-from rcsa_ident.workflows.identify import data_of
+from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.workflows.identify import data_to_learn_from
 
 #: Standard deviations by which something drawn may be off before a cut is said to contradict its drawing.
 SURPRISING = 4.0
-#: Share of a cut's lines that is left unexplained beyond which no tooling near its drawing has made it.
+#: Share of a cut's or a hit's lines that is left unexplained beyond which no tooling near its drawing has made it.
 UNEXPLAINED = 0.1
 #: Field of an alteration to that of a `Spread`, where they have not the same name.
 _SPREAD_OF = {
@@ -65,7 +68,7 @@ class Learnt:
 
 @dataclass(frozen=True, slots=True)
 class LearntTooling:
-    """A tooling before and after its cuts.
+    """A tooling before and after its cuts and hits.
 
     Parameters
     ----------
@@ -118,17 +121,21 @@ class LearntToolings:
         return self.converged and not any(each.contradiction for each in self.toolings)
 
 
-def learn_toolings(machine: IdentifiedMachine, campaign: Campaign, readings: Sequence[Reading]) -> LearntToolings:
-    """Return what the usable cuts of a campaign tell of its toolings, on a machine that earlier cuts have told.
+def learn_toolings(
+    machine: IdentifiedMachine, campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = ()
+) -> LearntToolings:
+    """Return what the usable cuts of a campaign and hits of the tip tell of its toolings, on a machine that earlier cuts have told.
 
     Parameters
     ----------
     machine : IdentifiedMachine
         Its posterior is what is known of it before.
     campaign : Campaign
-        Of toolings that are new to the machine; one stable cut of each is enough.
+        Of toolings that are new to the machine; one stable cut of each, or one hit of its tip along X and Y, is enough.
     readings : sequence of Reading
         As `rcsa_ident.workflows.identify.judge` returns them.
+    tests : sequence of HammerLines
+        As `rcsa_ident.workflows.identify.hammer_lines` returns those of the campaign.
 
     Raises
     ------
@@ -136,31 +143,89 @@ def learn_toolings(machine: IdentifiedMachine, campaign: Campaign, readings: Seq
         If machine, toolings or cuts do not tell what is needed.
     """
     known = KnownMachine(machine.posteriors(), machine.toolings)
-    used = list(dict.fromkeys(each.tooling for each in readings if each.verdict.usable))
+    taps = [tap_lines(test, machine.band) for test in tests]
+    used = list(dict.fromkeys([*(each.tooling for each in readings if each.verdict.usable), *(tap.tooling for tap in taps)]))
     for name in used:
         if campaign.toolings[name].spread.exact:
             raise InputError("spread", f"{name}: a drawing that is exact", "a table [spread] in its file, empty for an honest drawing's")
         if machine.toolings is not None and name in machine.toolings.toolings:
             allowed = "a tooling that is new to the machine, under a name of its own; cuts of old ones go into a new identification"
             raise InputError("toolings", f"{name}, which the machine was identified with", allowed)
-    if campaign.tests:
-        raise InputError("frfs", f"{len(campaign.tests)} hammer tests", "cuts alone")
-    data = data_of(campaign, readings, known=machine.toolings)
+    data = data_to_learn_from(campaign, readings, taps, machine.toolings)
     if not data.of_flange:
         raise InputError("sensors", "accelerometers on the housing alone", "cuts whose displacement sensors see the flange")
     if data.sweeps:
         raise InputError("cuts", "passes whose speed changes", "cuts at a speed that is kept")
     fit = fit_further(data, known, max(campaign.toolings[name].spread.spindle_joint for name in used))
-    notes = [*_speed_notes(known, data.spindle_speed.tolist())]
-    out = fit.contradicting()
+    notes = [*_speed_notes(known, data.spindle_speed[: data.cuts].tolist())]
+    missing = fit.contradicting()
+    notes += [f"{name}: contradicts the cuts and counts as little as it explains" for name in missing if name in data.cut_ids[data.cuts :]]
+    out = [name for name in missing if name in data.cut_ids[: data.cuts]]
     if out:
         notes.append(f"{', '.join(out)}: contradicts the other cuts and was left out")
         keep = np.array([k for k, name in enumerate(data.cut_ids) if name not in out], dtype=np.intp)
         fit = fit_further(data.of_cuts(keep), known, max(campaign.toolings[name].spread.spindle_joint for name in used))
     toolings = tuple(_learnt(campaign.toolings[name], fit, k) for k, name in enumerate(data.toolings))
-    return LearntToolings(
-        toolings, data.toolings, _taught(machine, fit.machine(known)), fit.misfit.model_error, fit.solution.converged, tuple(notes)
+    taught = _taught(machine, fit.machine(known, [each.drawn.name for each in toolings]))
+    return LearntToolings(toolings, data.toolings, taught, fit.misfit.model_error, fit.solution.converged, tuple(notes))
+
+
+def campaign_of_taps(tooling: Tooling, pairs: Sequence[tuple[str, str]], sensor_mass: float = 0.0) -> Campaign:
+    """Return a campaign of hits of one tooling's tip, the spindle at standstill.
+
+    Parameters
+    ----------
+    tooling : Tooling
+    pairs : sequence of (str, str)
+        Axes of response and force of each hit, X or Y.
+    sensor_mass : float [kg]
+        Of the sensor at the tip.
+
+    Raises
+    ------
+    InputError
+        If there are none, or one along other axes or with two.
+    """
+    for response, force in pairs:
+        if response != force or response not in ("X", "Y"):
+            raise InputError("taps", f"response {response or '?'} and force {force or '?'}", "FRFs along X or Y, response and force alike")
+    if not pairs:
+        raise InputError("taps", "no FRF", "one of the tip, along X or Y")
+    tests = tuple(
+        HammerTest(f"tap {axis}", tooling.name, Dof(axis.lower()), 0.0, 0.0, Path(), sensor_mass=sensor_mass) for axis, _ in pairs
     )
+    return Campaign(f"taps of {tooling.name}", None, (), None, {tooling.name: tooling}, (), tests=tests)
+
+
+def tap_lines(test: HammerLines, band: tuple[float, float]) -> HammerLines:
+    """Return the lines of a hit of the tip where the machine is known, without the mass of the sensor at the tip.
+
+    A sensor of mass m at the driven point adds its inertia there, 1/H' = 1/H - w^2 m: so H = H'/(1 + w^2 m H') [ewins2000].
+
+    Parameters
+    ----------
+    test : HammerLines
+    band : (float, float) [rad/s]
+        Lowest and highest frequency at which the machine is known.
+
+    Raises
+    ------
+    InputError
+        Force or response is not at the tip, or too few lines lie in the band.
+    """
+    for name in ("response", "force"):
+        z = getattr(test, name)
+        if z != 0.0:
+            found = "the flange" if z is None else f"{1e3 * z:g} mm from the tip"
+            raise InputError(f"frfs.{name}", f"{test.id}: {found}", 'force and response at the tip, "tip" both')
+    own = (test.omega >= band[0]) & (test.omega <= band[1])
+    count = int(np.sum(own))
+    if count < FEWEST_LINES:
+        found = f"{test.id}: {count} lines from {to_hz(band[0]):.0f} to {to_hz(band[1]):.0f} Hz"
+        raise InputError("frfs", found, f"at least {FEWEST_LINES} where the machine is known")
+    omega, value = test.omega[own], test.value[own]
+    bare = 1.0 / (1.0 + omega**2 * test.sensor_mass * value)
+    return replace(test, omega=omega, value=value * bare, variance=test.variance[own] * np.abs(bare) ** 4, sensor_mass=0.0)
 
 
 def _learnt(drawn: Tooling, fit: FurtherFit, place: int) -> LearntTooling:
@@ -185,12 +250,15 @@ def _learnt(drawn: Tooling, fit: FurtherFit, place: int) -> LearntTooling:
 
 
 def _contradiction(fit: FurtherFit, place: int) -> str:
-    """What speaks against what the cuts of a tooling have told of it."""
+    """What speaks against what the cuts and hits of a tooling have told of it."""
+    own = [place == tooling for tooling in fit.data.cut_tooling.tolist()]
+    cut, hit = any(own[: fit.data.cuts]), any(own[fit.data.cuts :])
+    what = "cuts and taps" if cut and hit else "taps" if hit else "cuts"
     unexplained, moved = max(fit.misfit.model_error), fit.surprise(place)
     if unexplained > UNEXPLAINED:
-        return f"no tooling near its drawing explains its cuts: {100.0 * unexplained:.0f} % of their lines are left over"
+        return f"no tooling near its drawing explains its {what}: {100.0 * unexplained:.0f} % of their lines are left over"
     if moved > SURPRISING:
-        return f"its cuts ask for {moved:.1f} standard deviations of what its drawing leaves open: is it the tooling that cut?"
+        return f"its {what} ask for {moved:.1f} standard deviations of what its drawing leaves open: is it the tooling that was clamped?"
     return ""
 
 

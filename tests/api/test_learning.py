@@ -113,6 +113,51 @@ def test_cuts_that_contradict_are_named_and_nothing_is_written(client, result):
     assert len(list(client.changes(kind="tooling", name="T7"))) == 1
 
 
+@pytest.mark.slow(20)
+def test_taps_teach_as_cuts_do(client, known, tmp_path):
+    """A campaign of hammer tests of the tip alone; the drawn contact is 0.7 of what it is."""
+    machine = client.make_machine("HPM").id
+    client.identify(machine, known)
+    client.write_tooling("T7", further_cuts.drawn())
+    file = further_cuts.write_tap(tmp_path / "tip.csv")
+    campaign = client.make_campaign(machine, further_cuts.tapped(file.name)).id
+    client.upload(campaign, file)
+    found = client.learn(campaign)
+    row = number(found, "rotational stiffness of the contact")
+    assert found.status == "converged"
+    assert abs(row.found - row.drawn / further_cuts.SOFTER) < 0.6 * abs(row.drawn - row.drawn / further_cuts.SOFTER)
+    done = client.take_over(campaign, machine=True, seen=found.etag)
+    assert (done.written, done.machine_written) == (["T7"], True)
+    assert client.machine(machine).identification.taught_by == [f"new tool tapped ({campaign})"]
+    assert refused(422, client.learn, campaign).errors[0].field == "campaign"
+    # hits in front of the flange tell of the machine, and are an identification's
+    keys = further_cuts.tapped("nut.csv", 1)
+    keys["frfs"][0]["force"] = 60.0
+    keys["toolings"] = {"T8": further_cuts.drawn() | {"name": "T8"}}
+    keys["frfs"][0]["tooling"] = "T8"
+    other = client.make_campaign(machine, keys).id
+    client.upload(other, file.rename(tmp_path / "nut.csv"))
+    assert refused(422, client.learn, other).errors[0].field == "frfs.force"
+
+
+@pytest.mark.slow(20)
+def test_toolings_and_machine_are_taken_over_together_or_not_at_all(client, known, monkeypatch):
+    """Another has written the machine between what was read of it and what is written."""
+    machine, campaign = made(client, known)
+    found, before = client.learn(campaign), client.tooling("T7").etag
+    store = client.http.app.state.components.store
+    written = store.put_together
+
+    def late(toolings, identification, note):
+        client.identify(machine, json.dumps(json.loads(known) | {"notes": ["identified again"]}))
+        return written(toolings, identification, note)
+
+    monkeypatch.setattr(store, "put_together", late)
+    refused(412, client.take_over, campaign, machine=True, seen=found.etag)
+    assert client.tooling("T7").etag == before
+    assert client.machine(machine).identification.taught_by == []
+
+
 @pytest.mark.slow(5)
 def test_refusals_are_the_commands(client, result, tmp_path):
     machine, campaign = made(client, result)

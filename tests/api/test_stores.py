@@ -69,6 +69,28 @@ def test_a_writer_may_say_what_it_has_seen(store):
     assert kept.delete("A", "T1", digest_of("y"))
 
 
+@pytest.mark.slow
+def test_texts_that_belong_together_are_all_kept_or_none(store):
+    m = machine()
+    store.machines.add(m)
+    store.toolings.put(document(), ABSENT)
+    before, further = document(name=m.id, words="before"), (document(name="T2"), ABSENT)
+    store.identifications.put(before, ABSENT)
+    taught = document(name=m.id, words="taught")
+    for toolings, expected in (
+        ([(document(words="y"), digest_of("x")), further], "another"),
+        ([(document(words="y"), "z")], before.digest),
+    ):
+        with pytest.raises(Stale):
+            store.put_together(toolings, (taught, expected))
+        assert store.toolings.get("A", "T1").text == "x"
+        assert store.toolings.get("A", "T2") is None
+        assert store.identifications.get("A", m.id).text == "before"
+    store.put_together([(document(words="y"), digest_of("x")), further], (taught, before.digest))
+    assert [store.toolings.get("A", name).text for name in ("T1", "T2")] == ["y", "x"]
+    assert store.identifications.get("A", m.id).text == "taught"
+
+
 def test_groups_see_nothing_of_each_other(store):
     mine, theirs = machine("A"), machine("B")
     store.machines.add(mine)

@@ -12,6 +12,7 @@ from rcsa_ident.identification.further_fit import FurtherFit
 from rcsa_ident.identification.known_machine import Gaussian, KnownMachine
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.tool_holder.alteration import ALTERATIONS
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 
 ONE_MODE = AxisLayout(1)
@@ -53,8 +54,10 @@ def machine(whole):
 @pytest.fixture(scope="module")
 def data():
     """Further cuts of a tool whose file believes its diameter to 2 %, where the earlier ones' believed 3 %, and of an unknown gain."""
-    axes = tuple(SimpleNamespace(axis=axis) for axis in (Dof.X, Dof.Y))
-    rough = SimpleNamespace(unknowns=(RoughUnknown("stickout", "new", "tooling"), SEEN), spread=np.array([5e-5, 0.02]))
+    axes = tuple(SimpleNamespace(axis=axis, still=np.zeros(0, dtype=bool)) for axis in (Dof.X, Dof.Y))
+    weights = np.zeros((1, len(ALTERATIONS), 2))
+    weights[0, ALTERATIONS.index("stickout"), 0] = weights[0, ALTERATIONS.index("fluted_diameter"), 1] = 1.0
+    rough = SimpleNamespace(unknowns=(RoughUnknown("stickout", "new", "tooling"), SEEN), spread=np.array([5e-5, 0.02]), weights=weights)
     return SimpleNamespace(axes=axes, rough=rough, rough_place=slice(1, 3), coefficient_spread=(0.05, 1.0, 1.0))
 
 
@@ -105,7 +108,7 @@ def test_a_machine_is_taught_as_if_all_unknowns_had_been_fitted(machine, whole, 
     theta = known.centre + np.linalg.solve(prior + information / WIDER**2, information @ step)
     layout = Layout((ONE_MODE, ONE_MODE), 3)
     solution = SimpleNamespace(theta=theta, layout=layout, evaluation=SimpleNamespace(hessian=prior + information))
-    taught = FurtherFit(data, known, solution, None).machine(machine)
+    taught = FurtherFit(data, known, solution, None).machine(machine, ["new"])
     # the same with everything at once: machine, joint, both numbers of toolings, gain and stickout
     everything = np.zeros((SIZE + 2, SIZE + 2))
     everything[:SIZE, :SIZE] = whole
@@ -115,11 +118,23 @@ def test_a_machine_is_taught_as_if_all_unknowns_had_been_fitted(machine, whole, 
     seen[size, SIZE], seen[size + 1, SIZE + 1], seen[size + 2, SIZE - 2] = 1.0, 1.0, 1.5
     covariance = np.linalg.inv(np.linalg.inv(everything) + seen.T @ information @ seen / WIDER**2)
     moved = covariance @ seen.T @ information @ step
-    np.testing.assert_allclose(taught.joint_covariance(data)[size:, size:], covariance[size:SIZE, size:SIZE], rtol=1e-7, atol=1e-10)
-    np.testing.assert_allclose(taught.toolings.mean, machine.toolings.mean + moved[size:SIZE], rtol=1e-7)
+    # of the new tooling itself: stickout and diameter, in units of what they were known to before
+    both = np.zeros((SIZE + 2, 2))
+    both[SIZE + 1, 0], both[SIZE - 2, 1] = 1.0, 1.0 / np.sqrt(whole[-2, -2])
+    told = np.hstack([np.eye(SIZE + 2)[:, size:SIZE], both])
+    expected = told.T @ covariance @ told
+    np.testing.assert_allclose(taught.toolings.covariance, expected, rtol=1e-7, atol=1e-10)
+    np.testing.assert_allclose(taught.joint_covariance(data)[size:, size:], expected, rtol=1e-7, atol=1e-10)
+    np.testing.assert_allclose(taught.toolings.mean, np.concatenate([machine.toolings.mean + moved[size:SIZE], [0.0, 0.0]]), rtol=1e-7)
+    assert taught.toolings.unknowns[2:] == (RoughUnknown("stickout", "new", "tooling"), RoughUnknown("fluted_diameter", "new", "tooling"))
+    np.testing.assert_allclose(taught.toolings.spread[2:], [5e-5, 0.03 * np.sqrt(whole[-2, -2])])
     for axis, first in ((Dof.X, 0), (Dof.Y, CORE)):
         here = np.r_[first : first + CORE, 2 * CORE : size]
         own = taught.posteriors[axis]
         np.testing.assert_allclose(own.theta, machine.posteriors[axis].theta + moved[here], rtol=1e-7, atol=1e-9)
         np.testing.assert_allclose(own.covariance, covariance[np.ix_(here, here)], rtol=1e-6, atol=1e-9)
-        np.testing.assert_allclose(own.tooling_cross, covariance[here, size:SIZE], rtol=1e-6, atol=1e-9)
+        cross = np.hstack([covariance[here, size:SIZE], covariance[here] @ both])
+        np.testing.assert_allclose(own.tooling_cross, cross, rtol=1e-6, atol=1e-9)
+    # taught again, what is known of it is what was learned the second time, once
+    again = FurtherFit(data, known, solution, None).machine(taught, ["new"])
+    assert again.toolings.unknowns == taught.toolings.unknowns

@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.toolings import write_tooling
-from rcsa_ident.machining_setup import HammerTest
 from rcsa_ident.tool_holder.alteration import Alteration
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughToolings, RoughUnknown, rough_toolings
 from rcsa_ident.tool_holder.spread import EXACT, Spread
@@ -43,10 +44,38 @@ def test_a_machine_without_covariance_is_refused(campaign):
         learning.learn_toolings(by_hand.machine(known=False), campaign, USED)
 
 
-def test_hammer_tests_are_refused(campaign, tmp_path):
-    test = HammerTest("hit", "T1", "x", 0.0, 0.0, tmp_path / "none.csv")
-    with pytest.raises(InputError, match="1 hammer tests, allowed is cuts alone"):
-        learning.learn_toolings(by_hand.machine(), replace(campaign, tests=(test,)), USED)
+@pytest.mark.parametrize(("pairs", "said"), [([("X", "Y")], "response X and force Y"), ([], "no FRF")])
+def test_taps_are_along_one_axis_each(campaign, pairs, said):
+    with pytest.raises(InputError, match=f"taps: found {said}"):
+        learning.campaign_of_taps(campaign.toolings["T1"], pairs)
+
+
+def test_the_mass_of_a_sensor_at_the_tip_is_taken_out():
+    """Of an oscillator that carries it, what is left is the oscillator alone."""
+    omega = 2.0 * np.pi * np.linspace(100.0, 3000.0, 60)
+    k, c, m, sensor = 2e7, 30.0, 0.3, 2e-3
+    carrying, bare = (1.0 / (k - omega**2 * mass + 1j * omega * c) for mass in (m + sensor, m))
+    test = HammerLines("tap", "T1", Dof.X, omega, carrying, 1e-20 * np.ones(60), 0.0, 0.0, sensor)
+    found = learning.tap_lines(test, (omega[4], omega[-5]))
+    np.testing.assert_allclose(found.value, bare[4:-4], rtol=1e-12)
+    # a small error of the curve is as much larger or smaller as the curve bends it: |dH/dH'| = |H/H'|^2
+    np.testing.assert_allclose(found.variance, 1e-20 * np.abs(bare / carrying)[4:-4] ** 4, rtol=1e-9)
+    assert found.sensor_mass == 0.0
+
+
+@pytest.mark.parametrize(
+    ("points", "band", "said"),
+    [
+        ({"response": 0.0, "force": 0.04}, (0.0, 1e5), "frfs.force: found tap: 40 mm from the tip"),
+        ({"response": None, "force": 0.0}, (0.0, 1e5), "frfs.response: found tap: the flange"),
+        ({"response": 0.0, "force": 0.0}, (1e3, 1.1e3), "frfs: found tap: 2 lines from 159 to 175 Hz"),
+    ],
+)
+def test_hits_that_tell_nothing_of_the_tip_are_refused(points, band, said):
+    omega = np.linspace(100.0, 6000.0, 60)
+    test = HammerLines("tap", "T1", Dof.X, omega, 1e-7 * np.ones(60), 1e-20 * np.ones(60), **points)
+    with pytest.raises(InputError, match=said):
+        learning.tap_lines(test, band)
 
 
 def test_a_learned_tooling_is_written_and_read_again(campaign, tmp_path):
@@ -60,7 +89,7 @@ def test_a_learned_tooling_is_written_and_read_again(campaign, tmp_path):
     spread = np.array([5e-5, 0.02, 0.005, 0.4, 0.4, 1.0])
     rough = RoughToolings((), spread, weights)
     fit = SimpleNamespace(
-        data=SimpleNamespace(rough=rough),
+        data=SimpleNamespace(rough=rough, cuts=1, cut_tooling=np.zeros(1, dtype=int)),
         values=np.array([1.0, -0.5, 0.0, 1.0, -1.0, 0.0]),
         covariance=np.diag([0.9, 0.8, 1.0, 0.3, 0.5, 0.7]) ** 2,
         before=(np.zeros(6), np.eye(6)),
@@ -91,8 +120,11 @@ def test_a_learned_tooling_is_written_and_read_again(campaign, tmp_path):
 
 @pytest.mark.parametrize(("error", "moved", "said"), [(0.23, 1.0, "23 % of their lines are left over"), (0.01, 6.0, "6.0 standard")])
 def test_cuts_that_contradict_are_named(error, moved, said):
-    fit = SimpleNamespace(misfit=SimpleNamespace(model_error=(0.01, error)), surprise=lambda place: moved)
+    data = SimpleNamespace(cuts=1, cut_tooling=np.array([0, 1, 2]))
+    fit = SimpleNamespace(data=data, misfit=SimpleNamespace(model_error=(0.01, error)), surprise=lambda place: moved)
     assert said in learning._contradiction(fit, 0)
+    assert "its cuts" in learning._contradiction(fit, 0)
+    assert "its taps" in learning._contradiction(fit, 2)
 
 
 def test_another_clamping_in_a_known_holder_differs_by_both_clampings(campaign):

@@ -6,12 +6,14 @@ import { allMachines, knownMachines } from "../state.js";
 import { plain } from "../units.js";
 import { beforeAndAfter, OWN } from "./spreads.js";
 
-/** The toolings that a campaign may teach: all that cut are new to an identified machine, and none of their drawings is exact. */
+/** The toolings that a campaign may teach: all that cut or were hit are new to an identified machine, and none of their drawings is exact. */
 export function taught(campaign) {
   const known = knownMachines().find((m) => m.id === campaign.machine)?.identification;
-  if (!known?.axes.length || known.status === "measured" || campaign.hammer_tests.length) return [];
+  if (!known?.axes.length || known.status === "measured") return [];
   if (known.taught_by.some((name) => name.endsWith(`(${campaign.id})`))) return [];
-  const used = [...new Set(campaign.cuts.filter((cut) => cut.verdict?.usable).map((cut) => cut.tooling))];
+  const hit = campaign.hammer_tests.filter((test) => test.lines);
+  if (hit.some((test) => test.response !== "tip" || test.force !== "tip")) return [];
+  const used = [...new Set([...campaign.cuts.filter((cut) => cut.verdict?.usable), ...hit].map((each) => each.tooling))];
   return used.every((name) => campaign.rough_toolings.includes(name) && !known.toolings.includes(name)) ? used : [];
 }
 
@@ -30,7 +32,7 @@ export function learnCard(campaign, names) {
     }),
   );
   return card(
-    `These cuts teach ${names.join(", ")}`,
+    `${campaign.hammer_tests.length ? "These measurements teach" : "These cuts teach"} ${names.join(", ")}`,
     null,
     h("div", { class: "row-of-buttons" }, look, h("span", { class: "soft" }, "the machine is taken as it was identified; nothing is written yet")),
     answer,
