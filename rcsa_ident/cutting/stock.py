@@ -8,7 +8,6 @@ import numpy as np
 
 from rcsa_ident.cutting.conditions import AnyEngagement, Block, Engagement, EngagementMap, Stepover
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.shown import Shown
 
@@ -106,4 +105,7 @@ def check_cut(cutter: Cutter, engagement: AnyEngagement, depth: float, feed_per_
     feed_per_tooth : float or None [m]
     """
     if not (cutter.is_cylinder and isinstance(engagement, Engagement)):
+        # compiled kernels, which few files need
+        from rcsa_ident.cutting.rows import rows_of
+
         rows_of(cutter, engagement, depth, feed_per_tooth)
