@@ -130,11 +130,16 @@ class Fuzzed:
         sent = case.as_transport_kwargs(base_url="http://localhost")
         headers = {k: v for k, v in sent.get("headers", {}).items() if k.lower() not in ("host", "user-agent", "x-api-key")}
         body = {"json": sent["json"]} if sent.get("json") is not None else {"content": sent.get("data") or b""}
-        if isinstance(body.get("content"), dict):
+        if known and sent.get("files"):
+            # a form with its parts, as a browser sends it; without them it is of another type
+            body = {"files": sent["files"]}
+        elif isinstance(body.get("content"), dict):
             body = {"data": body["content"]}
         try:
             answer = self.http.request(sent["method"], sent["url"], params=sent.get("params"), headers=headers, **body)
-        except (UnicodeEncodeError, httpx2.InvalidURL, httpx2.LocalProtocolError, ValueError, TypeError):
+            # a form is written part by part, and the checks want it as a whole
+            answer.request.read()
+        except (UnicodeEncodeError, httpx2.InvalidURL, httpx2.LocalProtocolError, ValueError, TypeError, AttributeError):
             # the client refuses to send it
             return
         self.statuses.add(answer.status_code)

@@ -22,7 +22,7 @@ LINES = {
     "flange": "tapped: X, 100 to 3000 Hz",
     "modes": "tip: 1 mode at 900 Hz",
     "tip": "tip.x, tip.y: 2901 frequencies, 100 to 3000 Hz, with its spread",
-    "spec": "90° to 180°, feed +X, 0.1 mm per tooth",
+    "spec": "50 % immersion, down milling, feed +X, 0.1 mm per tooth",
     "process": "4 teeth, Ø12 mm; K_tc 902 MPa, k_rc 0.26, K_re 5 N/mm; 90° to 180°, feed +X, 0.1 mm per tooth",
     "recording": "0.2 s at 25600 Hz: flange_x, flange_y, fixture_x, fixture_y",
     "reading": "T1-0: usable, 0 lines",
