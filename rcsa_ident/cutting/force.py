@@ -8,9 +8,8 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting._chip_kernels import chip_pieces
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.rows import Rows, rows_of
 from rcsa_ident.cutting.teeth import edges_at
@@ -319,21 +318,3 @@ def _chip_bounds(j: int, feed: FloatArray, runout: FloatArray) -> tuple[FloatArr
     """Distances a sin(phi) + b of tooth j to the surfaces of the teeth ahead, over one revolution of them: a and b, shape (teeth,)."""
     ahead = (j + np.arange(feed.size)) % feed.size
     return np.cumsum(feed[ahead]), runout[j] - runout[(ahead + 1) % feed.size]
-
-
-def regenerations(cutter: Cutter, feed_per_tooth: float, engagement: Engagement) -> list[tuple[int, float, float, int]]:
-    """Return which surface each tooth cuts into, with run-out: (tooth, start angle [rad], end angle [rad], teeth back).
-
-    A tooth cuts what the tooth so many teeth back left; where it is not named it cuts nothing.
-
-    Parameters
-    ----------
-    cutter : Cutter
-    feed_per_tooth : float [m]
-    engagement : Engagement
-    """
-    feed = feed_per_tooth * cutter.teeth * cutter.pitch / (2.0 * np.pi)
-    moved, step = np.stack([_chip_bounds(j, feed, cutter.runout) for j in range(cutter.teeth)], axis=2)
-    start, end = np.full(cutter.teeth, engagement.entry), np.full(cutter.teeth, engagement.exit)
-    pieces = chip_pieces(moved, step, start, end, np.ones(cutter.teeth, dtype=bool))
-    return [(int(j), float(start), float(end), int(k) + 1) for j, k, start, end in zip(*pieces, strict=True)]

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rcsa_ident.cutting.conditions import Block, Engagement, EngagementMap, Stepover, widest
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
@@ -256,3 +258,42 @@ def test_cuts_that_cannot_be_are_refused_by_name(build, field):
     with pytest.raises(InputError) as error:
         build()
     assert error.value.field == field
+
+
+def pieces_of(cutter, engagement, feed):
+    """Which surface each tooth of a cylinder cuts into: (tooth, start, end, teeth back); none where nothing cuts."""
+    rows = rows_of(cutter, engagement, 1e-3, feed)
+    tooth = np.argmin(np.abs(rows.angle[:, None] - cutter.tooth_angle), axis=1)
+    ahead = [np.cumsum(np.roll(cutter.pitch, -j)) for j in tooth]
+    back = [int(np.argmin(np.abs(each - delay))) + 1 for each, delay in zip(ahead, rows.delay, strict=True)]
+    return list(zip(tooth.tolist(), rows.start.tolist(), rows.end.tolist(), back, strict=True))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    runout=st.lists(st.floats(-8e-5, 8e-5), min_size=2, max_size=5),
+    feed=st.floats(1e-5, 2e-4),
+    entry=st.floats(0.0, 2.0),
+    width=st.floats(0.1, 1.1),
+)
+def test_teeth_that_run_out_cut_where_the_chip_is(runout, feed, entry, width):
+    """Against the smallest distance to the surfaces of the teeth ahead, angle by angle."""
+    n = len(runout)
+    weights = 1.0 + 0.3 * np.cos(np.arange(n) * 1.7)
+    cutter = Cutter(n, 0.012, pitch=2.0 * np.pi * weights / weights.sum(), runout=np.array(runout))
+    engagement = Engagement(entry, min(entry + width, np.pi))
+    pieces = pieces_of(cutter, engagement, feed)
+    for phi in np.linspace(engagement.entry, engagement.exit, 57)[1:-1]:
+        for j in range(n):
+            distances, moved = [], 0.0
+            for back in range(1, n + 1):
+                moved += feed * n * cutter.pitch[(j + back - 1) % n] / (2.0 * np.pi)
+                distances.append(moved * np.sin(phi) + runout[j] - runout[(j + back) % n])
+            near = np.sort(distances)
+            here = [p for p in pieces if p[0] == j and p[1] <= phi < p[2]]
+            assert len(here) <= 1
+            if abs(near[0]) < 1e-9 or near[1] - near[0] < 1e-9 or any(abs(phi - a) < 1e-6 for p in pieces for a in p[1:3]):
+                continue
+            assert bool(here) == (near[0] > 0.0)
+            if here:
+                assert here[0][3] == int(np.argmin(distances)) + 1
