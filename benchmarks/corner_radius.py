@@ -100,11 +100,10 @@ def told(campaign: Campaign, radius: float, doubt: float = 0.0) -> Campaign:
     return replace(campaign, toolings={n: replace(rounded(t, radius), spread=spread) for n, t in campaign.toolings.items()})
 
 
-def run(scratch: Path, names: Sequence[str], seeds: Sequence[int]) -> str:
-    """Return the table of the identifications, medians over the search's seeds in percent; prints each row as it is there."""
+def run(scratch: Path, names: Sequence[str], seeds: Sequence[int]) -> None:
+    """Print the table of the identifications, medians over the search's seeds in percent, each row as it is there."""
     head = ("machine", "cut with", "identified with", "status", "cuts", "cut", "never cut, same holder", "other holder", "s")
-    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
-    print("\n".join(lines), flush=True)
+    print("| " + " | ".join(head) + " |", "|---" * len(head) + "|", sep="\n", flush=True)
     for name in names:
         setup = setup_of(scratch, name)
         cases = (
@@ -126,8 +125,6 @@ def run(scratch: Path, names: Sequence[str], seeds: Sequence[int]) -> str:
             status = ", ".join(dict.fromkeys(str(each.status) for each in runs))
             row = f"| {name} | {words[0]} | {words[1]} | {status} | {len(runs[0].cut_ids)} | {told_errors} | {seconds:.0f} |"
             print(row, flush=True)
-            lines.append(row)
-    return "\n".join(lines)
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -141,4 +138,4 @@ def main(arguments: Sequence[str]) -> None:
     given = parser.parse_args(arguments)
     print(force_table(), flush=True)
     if given.machines:
-        print(run(given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-corner-")), given.machines, given.seeds))
+        run(given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-corner-")), given.machines, given.seeds)
