@@ -144,6 +144,8 @@ def warm() -> None:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
     from rcsa_ident.cutting.cutter import Cutter
+    from rcsa_ident.cutting.force import force_and_slope
+    from rcsa_ident.cutting.profile import Profile
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.signals.recording import Quantity
 
@@ -156,3 +158,6 @@ def warm() -> None:
         wave = 1e-6 * np.sum([np.cos(m * angle) for m in range(1, 9)], axis=0)
         made = Recording(rate, wave[:, None] + 1e-9 * rng.standard_normal((wave.size, len(sensors))), sensors)
         measure_cut("warm", "warm", made, made, Cutter(2, 0.012), conditions, CuttingCoefficients(9e8, 0.3))
+    # these records show no lines, and what force lines of a cutter with run-out need is compiled by lines alone
+    for cutter in (Cutter(2, 0.012), Cutter(2, 0.012, profile=Profile.ball(0.012))):
+        force_and_slope(cutter, conditions, CuttingCoefficients(9e8, 0.3), np.array([2, 4]))

@@ -400,6 +400,8 @@ from api.reading import examine
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.force import force_and_slope
+from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.measurement import measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
@@ -418,6 +420,9 @@ for wander in (0.0, 0.02):
     wave = np.cos(np.outer(angle * (1.0 + wander * np.arange(60000) / 60000), np.arange(1, 9))).sum(axis=1, keepdims=True)
     found = Recording(20000.0, 1e-6 * wave + 1e-6 * rng.standard_normal((60000, 2)), both)
     measure_cut("c", "t", found, found, Cutter(2, 0.012), conditions, CuttingCoefficients(9e8, 0.3))
+cutters = [Cutter(4, 0.012, 0.5, np.radians([84.0, 96.0, 84.0, 96.0])), Cutter(3, 0.012, 0.5, profile=Profile.bull_nose(0.012, 0.0005))]
+for cutter in cutters:
+    force_and_slope(cutter, conditions, CuttingCoefficients(9e8, 0.3, 0.1), np.arange(1, 9))
 assert len(known) > 5
 late = {key: each for key, each in kernels().items() if each != known.get(key, [])}
 assert not late, late

@@ -7,7 +7,7 @@ import { SHAPES } from "./tooling_start.js";
 const DIMENSIONS = [
   ["corner_radius_mm", "Corner radius", "length", "Empty: sharp, or not known"],
   ["cutting_edge_angle_deg", "Cutting edge angle", "degree", "KAPR, from the floor to the edge"],
-  ["taper_deg", "Taper", "degree", "Of each side, from the axis"],
+  ["taper_deg", "Angle from the axis", "degree", "Taper of each side"],
   ["largest_diameter_mm", "Largest diameter", "length", "DCX, where the edge ends"],
   ["cutting_depth_mm", "Edge height", "length", "APMX, from the tip to its end"],
   ["wiper_mm", "Wiper", "length", "BS, the flat beside the corner"],
@@ -92,14 +92,14 @@ export function cutterShape(keys) {
   const wavelength = quantity("Wavelength", "length", wave.wavelength_mm ?? null, { name: "cutter.serration.wavelength_mm", hint: "Along the axis" });
   // what stands in a file stays asked for, whatever the shape
   const asked = () => ASKED[shape.value] ?? [];
-  const lacking = h("p", { class: "note doubt", role: "status" });
+  const lacking = h("div", { role: "status" });
   const label = (key) => boxes.get(key).querySelector("label").textContent.replace(" [mm]", "");
   const told = (key) => (key === "profile" ? points.value.trim() : boxes.get(key).input.base);
   function show() {
     for (const [key, box] of boxes) box.hidden = !asked().includes(key);
     const missing = (NEEDED[shape.value] ?? []).filter((need) => ![need].flat().some(told));
-    lacking.hidden = !missing.length;
-    fill(lacking, "Without ", missing.map((need) => [need].flat().map(label).join(" or ").toLowerCase()).join(" and "), " it is computed as a cylinder.");
+    const words = missing.map((need) => [need].flat().map(label).join(" or ").toLowerCase()).join(" and ");
+    fill(lacking, missing.length ? h("p", { class: "note doubt" }, `Without ${words} it is computed as a cylinder.`) : null);
   }
   for (const input of [shape, points, ...[...boxes.values()].map((box) => box.input).filter(Boolean)]) input.addEventListener("input", show);
   show();
