@@ -16,39 +16,48 @@ from tests.oracles import cylinder_forces
 
 #: As many lines as a cut at 8000 rev/min shows of four teeth.
 ORDERS = 4 * np.arange(1, 9)
+#: As many as unlike teeth may tell.
+MANY = np.arange(1, 65)
 COEFFICIENTS = CuttingCoefficients(902e6, 0.26, 0.1, 12e3, 10e3)
 CUT = CuttingConditions(840.0, 0.4e-3, 1e-4, Engagement.from_immersion(0.5, "down"), 0.3)
 
 
 def run() -> list[dict[str, Any]]:
-    """Force lines per coefficient with and without run-out, lines with all their slopes, and those of a corner radius."""
-    return [_lines(False), _lines(True), _slopes(), _rounded()]
+    """Force lines per coefficient with and without run-out, unequal pitch and many orders, with all slopes, of a corner radius."""
+    unequal = Cutter(4, 0.012, np.radians(30.0), pitch=np.radians([84.0, 96.0, 84.0, 96.0]))
+    return [
+        _lines("8 orders", _cylinder(False), ORDERS),
+        _lines("8 orders, run-out", _cylinder(True), ORDERS, runout=True),
+        _lines("8 orders, unequal pitch", unequal, ORDERS),
+        _lines("64 orders", _cylinder(False), MANY),
+        _lines("64 orders, unequal pitch", unequal, MANY),
+        _slopes(),
+        _rounded(),
+    ]
 
 
 def _cylinder(runout: bool) -> Cutter:
     return Cutter(4, 0.012, np.radians(30.0), runout=2e-6 * np.cos(0.5 * np.pi * np.arange(4) - 0.2) if runout else None)
 
 
-def _told(cutter: Cutter) -> tuple[Any, ...]:
+def _told(cutter: Cutter, orders: np.ndarray) -> tuple[Any, ...]:
     engagement = CUT.engagement
     assert isinstance(engagement, Engagement)
-    rest = (CUT.axial_depth, CUT.feed_per_tooth, engagement.entry, engagement.exit, CUT.feed_angle, ORDERS)
+    rest = (CUT.axial_depth, CUT.feed_per_tooth, engagement.entry, engagement.exit, CUT.feed_angle, orders)
     return (cutter.diameter, cutter.helix, *rest)
 
 
-def _closed(cutter: Cutter, runout: bool) -> np.ndarray:
+def _closed(cutter: Cutter, orders: np.ndarray, runout: bool) -> np.ndarray:
     if runout:
-        return np.asarray(cylinder_forces.unit_lines(cutter.pitch, cutter.runout, *_told(cutter)))
-    return np.asarray(cylinder_forces.true_unit_lines(cutter.pitch, *_told(cutter)))
+        return np.asarray(cylinder_forces.unit_lines(cutter.pitch, cutter.runout, *_told(cutter, orders)))
+    return np.asarray(cylinder_forces.true_unit_lines(cutter.pitch, *_told(cutter, orders)))
 
 
-def _lines(runout: bool) -> dict[str, Any]:
-    cutter = _cylinder(runout)
-    ours, peer = unit_lines(cutter, CUT, ORDERS, runout=runout), _closed(cutter, runout)
+def _lines(name: str, cutter: Cutter, orders: np.ndarray, runout: bool = False) -> dict[str, Any]:
+    ours, peer = unit_lines(cutter, CUT, orders, runout=runout), _closed(cutter, orders, runout)
     error = float(np.max(np.abs(ours[..., :4] - peer) / np.abs(peer).max(axis=(0, 1))))
-    name = "lines of a cylinder per coefficient" + (" with run-out" if runout else "")
-    times = best_of(lambda: unit_lines(cutter, CUT, ORDERS, runout=runout)), best_of(lambda: _closed(cutter, runout))
-    return row(name, *(1e6 * each for each in times), "us", f"{error:.0e}")
+    times = best_of(lambda: unit_lines(cutter, CUT, orders, runout=runout)), best_of(lambda: _closed(cutter, orders, runout))
+    return row(f"lines of a cylinder per coefficient: {name}", *(1e6 * each for each in times), "us", f"{error:.0e}")
 
 
 def _slopes() -> dict[str, Any]:
@@ -57,8 +66,8 @@ def _slopes() -> dict[str, Any]:
 
     def before() -> None:
         for _ in range(5):
-            _closed(cutter, False)
-        _closed(eccentric, True)
+            _closed(cutter, ORDERS, False)
+        _closed(eccentric, ORDERS, True)
 
     times = best_of(lambda: force_and_slope(cutter, CUT, COEFFICIENTS, ORDERS)), best_of(before)
     return row("lines of a cylinder with their slopes", *(1e6 * each for each in times), "us", "")

@@ -9,6 +9,7 @@ import numpy as np
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import AnyEngagement, CuttingConditions, Engagement, EngagementProfile, feed_direction, widest
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.teeth import deepest
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.plausibility import FEED_PER_TOOTH, IMMERSION, remarks_of
 from rcsa_ident.remarks import Remark
@@ -134,6 +135,10 @@ class MillingProcess(Shown):
     def widest(self) -> Engagement:
         """The smallest engagement that holds those of all points of the edge."""
         return widest(self.engagement, self.cutter.outline, self.cutter.outline.height)
+
+    def within_reach(self, depth: float) -> float:
+        """Return a depth [m], or how deep the cutter cuts where that is less."""
+        return min(depth, deepest(self.cutter))
 
     @property
     def machine_from_feed(self) -> np.ndarray:

@@ -344,14 +344,6 @@ class Profile(Shown):
         arc = Arc(r_r, r_z, r, alpha, 0.5 * np.pi - beta)
         return cls((*_cone(arc.ends[0], alpha), arc, *_onwards(arc, beta, h)))
 
-    @classmethod
-    def points(cls, points: FloatArray) -> Profile:
-        """Return the outline through points (r, z) [m], shape (n, 2), from the tip up."""
-        points = np.asarray(points, dtype=float)
-        if points.ndim != 2 or points.shape[0] < 2 or points.shape[1] != 2:
-            raise InputError("profile", points.shape, "two or more points (r, z)")
-        return cls(tuple(Line(*map(float, (*a, *b))) for a, b in pairwise(points)))
-
 
 def _flank(r_c: float, z_c: float, big: float, touch: float, length: float, upper: float) -> tuple[Arc, ...]:
     """A long arc from where it touches the one below it up to the edge's end, there with an arc that meets the end's plane."""

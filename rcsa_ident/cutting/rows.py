@@ -71,11 +71,6 @@ class Rows:
         """How many there are."""
         return int(self.angle.size)
 
-    @property
-    def points(self) -> bool:
-        """Whether any of them is a node of a curved edge."""
-        return bool(np.any(self.far <= self.near)) and self.count > 1
-
 
 #: Names of the arrays of rows, in their order.
 COLUMNS = tuple(each.name for each in fields(Rows))[:-1]
@@ -112,10 +107,13 @@ def rows_of(
     if cutter.offset and feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
     feed = 1.0 if feed_per_tooth is None else feed_per_tooth
-    if cutter.is_cylinder and cutter.helix_kind is HelixKind.LEAD and isinstance(engagement, Engagement) and not along:
+    # along a wall constant lead and constant angle are the same
+    if cutter.is_cylinder and isinstance(engagement, Engagement) and not along:
         return _of_cylinder(cutter, engagement, depth, feed)
     pieces = places_of(cutter, engagement, depth, along, nodes)
-    found = [table for piece in pieces for table in _of_piece(cutter, piece, feed, rise)]
+    # a map may hold angles at which the tooth has no chip, as behind a tool that leans
+    sought = cutter.offset or isinstance(engagement, EngagementMap)
+    found = [table for piece in pieces for table in _of_piece(cutter, piece, feed, rise, sought)]
     values = np.concatenate(found, axis=1) if found else np.zeros((len(COLUMNS), 0))
     spacing = float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi
     return Rows(**dict(zip(COLUMNS, values, strict=True)), spacing=spacing)
@@ -233,8 +231,8 @@ def _nodes(
     return low + (high - low) * share, weight * (high - low) * segment.length
 
 
-def _of_piece(cutter: Cutter, piece: Places, feed: float, rise: float) -> list[FloatArray]:
-    """Rows of the places of one piece, tables whose rows are the fields of `Rows`."""
+def _of_piece(cutter: Cutter, piece: Places, feed: float, rise: float, sought: bool) -> list[FloatArray]:
+    """Rows of the places of one piece, tables whose rows are the fields of `Rows`; whether chips are sought that are above zero."""
     found = []
     z, r, kappa, width, edges, span, arcs = piece
     per_turn = feed * cutter.teeth / (2.0 * np.pi)
@@ -252,7 +250,7 @@ def _of_piece(cutter: Cutter, piece: Places, feed: float, rise: float) -> list[F
         step = edges.offset[j] - edges.offset[(order + 1) % cutter.teeth] - climb * per_turn * delay
         for start, end in np.moveaxis(arcs, 2, 1):
             keep = end > start + 1e-12
-            if cutter.offset:
+            if sought:
                 node, which, start, end = chip_pieces(moved, step, start.copy(), end.copy(), keep)
             else:
                 node, which = np.flatnonzero(keep), 0

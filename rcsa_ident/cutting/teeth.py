@@ -15,6 +15,8 @@ from rcsa_ident.errors import InputError
 _POLE = 0.02
 #: Points of the table by which a lag of constant angle is told, a segment.
 _POINTS = 257
+#: Share by which a depth stays above the one at which teeth meet, and heights at which that is sought.
+_ROUNDING, _HEIGHTS = 1e-6, 4001
 
 
 class Edges(NamedTuple):
@@ -75,6 +77,31 @@ def lags(cutter: Cutter, z: FloatArray) -> FloatArray:
     """
     wound = 2.0 * z / cutter.diameter if cutter.helix_kind is HelixKind.LEAD else _wound(cutter, z)
     return np.tan(cutter.helices)[:, None] * wound
+
+
+def deepest(cutter: Cutter) -> float:
+    """Return the depth up to which a cutter cuts [m]: where its edge ends, or teeth of unlike helix meet; infinite of a plain cylinder.
+
+    Examples
+    --------
+    Two teeth of 12 mm at 0 and 60 degrees, half a turn apart:
+
+    >>> round(1e3 * deepest(Cutter(2, 0.012, helix=np.radians([0.0, 60.0]))), 3)
+    10.883
+    """
+    if cutter.is_cylinder:
+        return np.inf
+    height, lead = cutter.outline.height, np.tan(cutter.helices)
+    closing = np.roll(lead, -1) - lead
+    meets = closing > 0.0
+    if not np.any(meets):
+        return height
+    # how far the edges have wound where the first two teeth meet, a little before that
+    wound = (1.0 - _ROUNDING) * float(np.min(cutter.pitch[meets] / closing[meets]))
+    if cutter.helix_kind is HelixKind.LEAD:
+        return min(height, 0.5 * cutter.diameter * wound)
+    z = height * (np.arange(_HEIGHTS) / (_HEIGHTS - 1)) ** 2
+    return float(np.interp(wound, _wound(cutter, z), z))
 
 
 def _wound(cutter: Cutter, z: FloatArray) -> FloatArray:

@@ -89,8 +89,8 @@ def cutter_of(table: Table) -> Cutter:
     }
     wave = _wave(table, teeth)
     with table.naming(_NAMES):
-        own = rows is not None and shape is CutterShape.PROFILE
-        profile = outline_through(rows) if own else outline_of(shape, diameter, corner, dimensions)  # type: ignore[arg-type]
+        # points are refused beside any other shape
+        profile = outline_of(shape, diameter, corner, dimensions) if rows is None else outline_through(rows)
         serration = None if wave is None else Serration(**wave)
         cutter = Cutter(
             teeth, diameter, shape=shape, corner_radius=corner, profile=profile, serration=serration, dimensions=dimensions, **given

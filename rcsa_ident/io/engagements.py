@@ -9,7 +9,6 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import read_table
 
 COLUMNS = ("z_mm", "entry_angle_deg", "exit_angle_deg")
@@ -48,12 +47,6 @@ def read_engagement_map(path: str | Path, lead: float = 0.0) -> EngagementMap:
 def engagement_map_of(z_mm: FloatArray, entry_deg: FloatArray, exit_deg: FloatArray, lead: float = 0.0) -> EngagementMap:
     """Return the engagement map of heights [mm] and angles [deg], each of shape (n,), for a tool that leads by an angle [rad]."""
     return EngagementMap(1e-3 * np.asarray(z_mm), np.radians(entry_deg), np.radians(exit_deg), lead)
-
-
-def write_engagement_map(path: str | Path, engagement: EngagementMap) -> None:
-    """Write a map as `read_engagement_map` reads it."""
-    lines = [",".join(COLUMNS), *(",".join(f"{value:.12g}" for value in row) for row in rows_of_map(engagement).tolist())]
-    write_text(path, "\n".join(lines) + "\n")
 
 
 def rows_of_map(engagement: EngagementMap) -> FloatArray:

@@ -12,6 +12,8 @@ from rcsa_ident.stability.tip_modes import DIRECTIONS
 
 #: A usual axial stiffness and damping of a spindle [N/m], [-], and its resonances over the chatter's frequency.
 STIFFNESS, DAMPING, PLACES = 5e7, 0.03, (0.9, 1.1)
+#: Speeds that are asked, at most, beside that of the lowest limit.
+_SPEEDS = 12
 #: Change of a limit, as a share of it, that is worth a word.
 _WORTH = 0.1
 
@@ -40,7 +42,8 @@ def axial_doubt(tip: Receptance, process: MillingProcess, found: StabilityLobes)
     if not np.any(np.isfinite(limits)) or not np.isfinite(found.chatter_frequency[int(np.argmin(limits))]):
         return ""
     chatter = float(found.chatter_frequency[int(np.argmin(limits))])
-    speeds, max_depth = found.spindle_speed, found.max_depth
+    few = np.linspace(0, limits.size - 1, min(limits.size, _SPEEDS)).astype(int)
+    speeds, max_depth = found.spindle_speed[np.union1d(few, np.argmin(limits))], found.max_depth
     omega, planar = finer(tip)
     rigid = march(omega, planar, process, ladder(process, 2, max_depth), speeds).limit
     steps, ratios = ladder(process, 3, max_depth), []

@@ -60,9 +60,9 @@ class DepthLadder(NamedTuple):
 
 
 def ladder(process: MillingProcess, directions: int, max_depth: float) -> DepthLadder:
-    """Return a cut's mean stiffness at depths up to the largest."""
+    """Return a cut's mean stiffness at depths up to the largest, or to how deep the cutter cuts."""
     count = int(np.ceil(-np.log(_LEAST) / np.log(_RATIO))) + 1
-    depth = max_depth * np.geomspace(_LEAST, 1.0, count)
+    depth = process.within_reach(max_depth) * np.geomspace(_LEAST, 1.0, count)
     stiffness = np.array([regeneration(process, float(a), directions_of(directions)).mean for a in depth])
     pitch = edges_at(process.cutter, depth, np.full(depth.size, 0.5 * np.pi)).pitch.T
     at_tip = process.cutter.pitch

@@ -48,7 +48,7 @@ def stability_lobes(
     speeds : array, shape (n,) [rad/s]
         In any order.
     max_depth : float [m]
-        Limits beyond it are not of interest.
+        Limits beyond it are not of interest; where the cutter's edge ends before, or its teeth meet, that is where the search ends.
     method : StabilityMethod, default ZeroOrder()
     draws : int
         Machines drawn from what is not known of the tip and of the cutting coefficients, where the tip is an `UncertainReceptance` with
@@ -70,13 +70,14 @@ def stability_lobes(
     if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):
         raise InputError("speeds", speeds.tolist(), "one or more finite spindle speeds above 0 [rad/s]")
     max_depth = positive("max_depth", max_depth, "m")
-    if not process.is_plain:
-        # an edge that ends, teeth that meet, an engagement that the cutter cannot have: said before anything is computed
-        rows_of(process.cutter, process.engagement, max_depth, process.feed_per_tooth)
-        widest(process.engagement, process.cutter.outline, max_depth)
-    found = _limits(tip, process, speeds, max_depth, method, draws, seed)
+    within = process.within_reach(max_depth)
+    # an engagement that the cutter cannot have is said before anything is computed
+    widest(process.engagement, process.cutter.outline, within)
+    told = f"the cutter's edge ends, or its teeth meet, at {1e3 * within:.4g} mm: no deeper cut is looked at"
+    ends = () if within == max_depth else (told,)
+    found = _limits(tip, process, speeds, within, method, draws, seed)
     # the smallest limit is the depth beside which a corner radius is seen
-    return replace(found, warnings=(*found.warnings, *process.cutter.cylinder_remarks(float(found.nominal.min()))))
+    return replace(found, warnings=(*found.warnings, *ends, *process.cutter.cylinder_remarks(float(found.nominal.min()))))
 
 
 def _limits(

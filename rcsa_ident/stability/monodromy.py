@@ -180,7 +180,8 @@ class MonodromyOperator:
         rows = self._rows(speed, depth)
         known = regeneration_of(self.process, rows, self.count)
         delays, place = np.unique(np.round(rows.delay, 12), return_inverse=True)
-        splits = np.full(rows.count, float(self.process.cutter.serration is None))
+        # cells of a wave that lag between their ends open gradually
+        splits = (rows.far <= rows.near) | (self.process.cutter.serration is None)
         windows = np.stack([rows.angle, rows.start, rows.end, rows.near, rows.far, place, splits], axis=1)
         moved = self._directions(rows.z)
         forms = [_projected(moved, form) for form in (known.stiffness, known.rubbing) if form is not None]
@@ -235,14 +236,9 @@ def stable_depth_bound(modes: TipModes, process: MillingProcess) -> float:
         c, widest = process.coefficients, process.widest
         teeth = max(1.0, np.ceil((widest.exit - widest.entry) / float(np.min(process.cutter.pitch))))
         return float(0.9 / (2.0 * teeth * c.tangential * np.hypot(1.0, c.radial_ratio) * modes.planar.largest))
-    depth = min(0.5 * process.cutter.outline.height, process.cutter.diameter)
+    depth, directions = process.within_reach(0.5 * process.cutter.diameter), directions_of(modes.directions)
     for _ in range(_SMALLER):
-        try:
-            strongest = regeneration(process, depth, directions_of(modes.directions)).strongest
-        except InputError:
-            # teeth that meet do not at a smaller depth
-            strongest = np.inf
-        if 2.0 * strongest * modes.largest < 0.9:
+        if 2.0 * regeneration(process, depth, directions).strongest * modes.largest < 0.9:
             return depth
         depth *= 0.5
     raise InputError("tip modes", "a tip that any cut makes vibrate", "a stiffness beside which that of a thin cut is small")

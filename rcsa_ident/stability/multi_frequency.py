@@ -14,6 +14,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.stability.depth_march import finer, ladder, march
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
 from rcsa_ident.stability.methods import MethodName, Watch, coarse_to_fine
+from rcsa_ident.stability.regeneration import check_constant
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TIP, TipModes, receptance_of
 
@@ -72,11 +73,7 @@ class MultiFrequency:
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
         cutter = process.cutter
-        if process.speed_variation is not None:
-            raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
-        if process.engagement_profile is not None:
-            allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
-            raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
+        check_constant(process)
         receptance = receptance_of(tip, wide=True)
         if process.is_plain:
             receptance = receptance.block(TIP)
@@ -89,7 +86,7 @@ class MultiFrequency:
         lost = 0
         for i in coarse_to_fine(speeds.size):
             speed = float(speeds[i])
-            found = Hill(motion, teeth, speed, float(guesses[i])).limit(max_depth)
+            found = Hill(motion, teeth, speed, float(guesses[i])).limit(process.within_reach(max_depth))
             if found is not None:
                 limit[i] = found.depth
                 chatter[i] = np.nan if found.chatter is None else found.chatter
@@ -111,7 +108,7 @@ def _guesses(receptance: Receptance, process: MillingProcess, speeds: FloatArray
         return np.full(speeds.size, _THIN)
     steps = ladder(process, receptance.values.shape[1], max_depth)
     found = march(*finer(receptance), process, steps, speeds).limit
-    return np.where(np.isfinite(found), found, max_depth)
+    return np.where(np.isfinite(found), found, process.within_reach(max_depth))
 
 
 def _doubts(tip: TipMotion, chatter: FloatArray) -> list[str]:

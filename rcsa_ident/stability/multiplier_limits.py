@@ -144,7 +144,7 @@ def _limit(
         return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance, careful_from=islands_from(cut.process)), step, True
     # a search that is a little too deep and a little rough, then the limit from where it ended
     step = longest_step(cut)
-    deepest = min(1.1 * max_depth, cut.process.cutter.outline.height)
+    deepest = cut.process.within_reach(1.1 * max_depth)
     depth = first_loss(Growth(cut, speed, step, ROUGH), low, deepest, 10.0 * tolerance, careful_from=islands_from(cut.process))
     if depth is None:
         return None, step, True

@@ -10,7 +10,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.forms import Directions, force_form, mean_over_turn, normal_form, product_form
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.cutting.rows import NODES, Rows, rows_of
+from rcsa_ident.cutting.rows import Rows, rows_of
 from rcsa_ident.errors import InputError
 
 #: Share of the radius below which the speed of a rubbing edge counts as that at this share: towards the axis it falls to nothing.
@@ -51,20 +51,18 @@ class Regeneration:
         return float(max(copies, 1.0) * each)
 
 
-def regeneration(process: MillingProcess, depth: float, directions: Directions = 2, nodes: int = NODES) -> Regeneration:
+def regeneration(process: MillingProcess, depth: float, directions: Directions = 2) -> Regeneration:
     """Return what a cut of a depth pushes with.
 
     Parameters
     ----------
     process : MillingProcess
-        An engagement profile stands in the way of one engagement: see `along`.
+        Its engagement; one that changes by a profile of its own is left aside.
     depth : float [m]
     directions : 2, 3 or 5
         x and y of the machine, with z, with the slopes x' and y'.
-    nodes : int
-        Of a curved piece of the cutter's outline.
     """
-    rows = rows_of(process.cutter, process.engagement, depth, process.feed_per_tooth, along=directions == 5, nodes=nodes)
+    rows = rows_of(process.cutter, process.engagement, depth, process.feed_per_tooth, along=directions == 5)
     return regeneration_of(process, rows, directions)
 
 
@@ -120,6 +118,15 @@ def sliced(rows: Rows, parts: FloatArray) -> Rows:
         "width": rows.width[whole] * (lower - upper),
     }
     return replace(rows, **{**values, **moved, **angles})
+
+
+def check_constant(process: MillingProcess) -> None:
+    """Raise `InputError` where the speed varies, or the engagement changes by a profile of its own."""
+    if process.speed_variation is not None:
+        raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
+    if process.engagement_profile is not None:
+        allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
+        raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
 
 
 def directions_of(count: int) -> Directions:

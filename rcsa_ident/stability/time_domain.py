@@ -127,7 +127,7 @@ class TimeDomain:
         for i in coarse_to_fine(speeds.size):
             speed = float(speeds[i])
             cut = _Cut(modes, process, speed, self.contact_loss)
-            depth = first_loss(lambda d, cut=cut: cut.growth(d, self.periods), low, max_depth, self.tolerance, _RATIO)  # type: ignore[misc]
+            depth = first_loss(lambda d, cut=cut: cut.growth(d, self.periods), low, process.within_reach(max_depth), self.tolerance, _RATIO)  # type: ignore[misc]
             if depth is not None:
                 limit[i] = depth
                 chatter[i], flip[i] = cut.vibration(depth, self.periods)

@@ -15,8 +15,9 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part, pitch_envelope
-from rcsa_ident.stability.depth_march import finer, ladder, march
+from rcsa_ident.stability.depth_march import Marched, finer, ladder, march
 from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.stability.regeneration import check_constant
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes, receptance_of
 from rcsa_ident.units import to_rpm
@@ -25,6 +26,8 @@ from rcsa_ident.units import to_rpm
 FEWEST_TEETH_IN_CUT = 1.0
 #: Unequal pitch asks each speed at all frequencies: so many times as much.
 _PITCH_FACTOR = 30.0
+#: Operations of a march through depths.
+_MARCH = 2500.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,12 @@ class ZeroOrder:
     gives_maps: ClassVar[bool] = False
 
     def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
-        """Return how many lobes stand above each speed, over those at 4000 rev/min; with unequal pitch all frequencies are asked."""
+        """Return how many lobes stand above each speed, over those at 4000 rev/min; with unequal pitch all frequencies are asked.
+
+        Of a shape the march through its depths costs as much for one speed as for many, with unlike teeth for each of them.
+        """
+        if not process.is_plain:
+            return np.full(speeds.size, _MARCH / (speeds.size if process.cutter.equally_spaced else 1.0))
         return (1.0 if _equal_pitch(process) else _PITCH_FACTOR) * 4000.0 / to_rpm(speeds)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
@@ -69,28 +77,22 @@ class ZeroOrder:
         lobe[order] = np.where(beyond, -1, curve[2])
         strongest, place = largest_real_part(omega, trace, determinant)
         exists = strongest > 1e-12 * float(np.max(np.abs(trace)))
-        unlike = _unlike_teeth(process)
-        return StabilityLobes(
-            speeds,
-            limit,
-            chatter,
-            lobe,
-            max_depth,
-            self.name,
-            # of equal teeth: others have limits below it
-            absolute_limit=None if unlike else 1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
-            absolute_frequency=place if exists and not unlike else None,
-            warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, place if exists else None)),
-            withheld=unlike,
-        )
+        absolute = 1.0 / (2.0 * coefficients.tangential * strongest) if exists else np.inf
+        found = Marched(limit, chatter, lobe, absolute, place if exists else np.nan)
+        return self._answer(found, receptance, process, speeds, max_depth)
 
     def _marched(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limits of a cut whose mean stiffness is not proportional to the depth."""
-        _constant_speed(process)
+        check_constant(process)
         directions = receptance.values.shape[1]
         found = march(*finer(receptance), process, ladder(process, directions, max_depth), speeds)
-        unlike = _unlike_teeth(process)
-        exists = np.isfinite(found.absolute)
+        return self._answer(found, receptance, process, speeds, max_depth)
+
+    def _answer(
+        self, found: Marched, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float
+    ) -> StabilityLobes:
+        """Return limits with what speaks against them; the absolute limit is that of equal teeth, and others have limits below it."""
+        unlike, critical = _unlike_teeth(process), found.frequency if np.isfinite(found.absolute) else None
         return StabilityLobes(
             speeds,
             found.limit,
@@ -98,9 +100,9 @@ class ZeroOrder:
             found.lobe,
             max_depth,
             self.name,
-            absolute_limit=None if unlike else found.absolute,
-            absolute_frequency=found.frequency if exists and not unlike else None,
-            warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, found.frequency if exists else None)),
+            absolute_limit=None if unlike else float(found.absolute),
+            absolute_frequency=None if unlike else critical,
+            warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, critical)),
             withheld=unlike,
         )
 
@@ -114,7 +116,7 @@ class ZeroOrder:
         factors: FloatArray | None,
     ) -> FloatArray:
         """Return what `depths` does for a shaped cut; its ladder is linear in K_tc and in k_rc."""
-        _constant_speed(process)
+        check_constant(process)
         directions, known = tips.shape[-1], process.coefficients
         whole = ladder(process, directions, max_depth)
         half = ladder(replace(process, coefficients=replace(known, radial_ratio=0.5 * known.radial_ratio)), directions, max_depth)
@@ -187,17 +189,8 @@ class ZeroOrder:
 
 def _directions(process: MillingProcess) -> FloatArray:
     """[alpha0] of a cut at constant speed."""
-    _constant_speed(process)
+    check_constant(process)
     return mean_directional_matrix(process.cutter.teeth, same_everywhere(process.engagement), process.coefficients, process.feed_angle)
-
-
-def _constant_speed(process: MillingProcess) -> None:
-    """Raise `InputError` where the speed varies, or the engagement changes by a profile of its own."""
-    if process.speed_variation is not None:
-        raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
-    if process.engagement_profile is not None:
-        allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
-        raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
 
 
 def _of_ratio(process: MillingProcess) -> FloatArray:

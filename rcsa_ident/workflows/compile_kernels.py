@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.poles import PoleResidue
@@ -125,7 +127,9 @@ def _tip() -> TipModes:
 def _lobes() -> None:
     tip = _tip().receptance()
     speeds = np.linspace(800.0, 1000.0, 3)
-    for cutter in (_CUTTER, Cutter(2, 0.012, 0.0, np.array([3.0, 2.0 * np.pi - 3.0]))):
+    unlike = Cutter(2, 0.012, 0.0, np.array([3.0, 2.0 * np.pi - 3.0]))
+    # and of shapes, whose limits are marched through depths
+    for cutter in (_CUTTER, unlike, *(replace(each, profile=Profile.ball(0.012)) for each in (_CUTTER, unlike))):
         process = MillingProcess(cutter, _COEFFICIENTS, _CONDITIONS.engagement)
         stability_lobes(tip, process, speeds, 0.01)
         # and of machines that were drawn, for bands

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from rcsa_ident.cutting.outlines import outline_through
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.segments import Arc, Line
 from rcsa_ident.errors import InputError
@@ -26,7 +27,7 @@ OUTLINES = {
     "lens": Profile.lens(0.012, 0.030, 0.001),
     "oval": Profile.oval(0.012, 0.085, 0.002, 0.020),
     "taper barrel": Profile.taper_barrel(0.250, 0.002, 20 * DEG, 0.010, 0.015),
-    "points": Profile.points([[0.0, 0.0], [0.004, 0.001], [0.005, 0.004]]),
+    "points": outline_through([[0.0, 0.0], [0.004, 0.001], [0.005, 0.004]]),
 }
 
 
@@ -115,8 +116,8 @@ def test_a_drawing_ends_at_its_height():
         (lambda: Profile((Line(0.005, 0.0, 0.005, 0.004), Line(0.006, 0.004, 0.006, 0.005))), "profile"),
         (lambda: Profile((Line(0.005, 0.0, -0.001, 0.004),)), "profile"),
         (lambda: Profile((Arc(0.0, 0.006, 0.006, 90 * DEG, 0.0),)), "profile"),
-        (lambda: Profile.points([[0.0, 0.0], [0.004, 0.002], [0.005, 0.001]]), "profile"),
-        (lambda: Profile.points([[0.0, 0.0]]), "profile"),
+        (lambda: outline_through([[0.0, 0.0], [0.004, 0.002], [0.005, 0.001]]), "profile"),
+        (lambda: outline_through([[0.0, 0.0]]), "profile"),
         (lambda: Profile.bull_nose(0.016, 0.009), "corner_radius"),
         (lambda: Profile.tapered(0.016, 1.6), "taper"),
         (lambda: Profile.face(0.063, np.pi, 0.006), "cutting_edge_angle"),

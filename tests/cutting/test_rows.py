@@ -11,7 +11,7 @@ from rcsa_ident.cutting.forms import exponential_form, force_form, lines_of_rows
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.cutting.serration import Serration
-from rcsa_ident.cutting.teeth import lags
+from rcsa_ident.cutting.teeth import deepest, lags
 from rcsa_ident.errors import InputError
 from tests.stability.tilted_ball import tilted_ball
 
@@ -220,6 +220,40 @@ def test_a_ball_that_does_not_reach_the_block_has_no_rows():
     reached = 0.006 - np.sqrt(0.006**2 - 0.004**2)
     assert rows_of(ball, beside, 0.99 * reached).count == 0
     assert rows_of(ball, beside, 1.01 * reached).count > 0
+
+
+def test_a_map_takes_no_chip_where_the_tooth_has_none():
+    """Behind the tool, and where a tool that leans forward lifts its edge out of the feed."""
+    ball = Cutter(2, 0.012, profile=Profile.ball(0.012))
+    full = EngagementMap([0.0, 0.004], [0.0, 0.0], [2.0 * np.pi, 2.0 * np.pi])
+    rows = rows_of(ball, full, 0.003, 0.1e-3, nodes=24)
+    assert rows.end.max() <= np.pi + 1e-9
+    assert volume(rows) == pytest.approx(volume(rows_of(ball, SLOT, 0.003, 0.1e-3, nodes=24)), rel=1e-9)
+    leaning = rows_of(ball, EngagementMap([0.0, 0.004], [0.0, 0.0], [2.0 * np.pi] * 2, feed_rise=0.4), 0.003, 0.1e-3, nodes=24)
+    middle = 0.5 * (leaning.start + leaning.end)
+    assert np.all(leaning.feed * np.sin(middle) + leaning.step > 0.0)
+    # where the edge lies flatter than the feed climbs nothing is cut
+    assert leaning.kappa.min() > 0.4
+
+
+def test_constant_angle_on_a_cylinder_is_one_row_as_of_constant_lead():
+    lead, angle = (rows_of(Cutter(3, 0.012, helix=0.5, helix_kind=kind), SLOT, 0.004, 0.1e-3) for kind in ("lead", "angle"))
+    assert lead.count == angle.count == 1
+    assert angle.far == pytest.approx(lead.far)
+
+
+@pytest.mark.parametrize(
+    ("cutter", "meet"),
+    [
+        (Cutter(2, 0.012, helix=np.radians([0.0, 60.0])), 0.5 * 0.012 * np.pi / np.tan(60 * DEG)),
+        (Cutter(2, 0.012, helix=np.radians([20.0, 60.0]), helix_kind="angle"), 0.006 * np.pi / (np.tan(60 * DEG) - np.tan(20 * DEG))),
+    ],
+)
+def test_teeth_meet_where_they_should(cutter, meet):
+    assert deepest(cutter) == pytest.approx(meet, rel=1e-4)
+    assert rows_of(cutter, SLOT, deepest(cutter) * (1.0 - 1e-4), 0.1e-3).count > 0
+    with pytest.raises(InputError, match="meet"):
+        rows_of(cutter, SLOT, meet * (1.0 + 1e-3), 0.1e-3)
 
 
 def test_an_engagement_map_takes_several_arcs_at_a_height_and_nothing_above():

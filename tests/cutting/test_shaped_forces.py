@@ -133,14 +133,15 @@ def test_an_engagement_map_that_says_the_same_pushes_the_same():
 def test_a_feed_that_rises_takes_off_the_chip_what_it_climbs():
     """A 45 degree cone that is fed along its own line: nothing is cut at the front, all of it where the feed is level."""
     cutter = Cutter(1, 0.02, profile=Profile.face(0.02, 45 * DEG, 0.006))
-    z, start, end = np.array([0.0, 1e-3]), np.zeros(2), np.full(2, np.pi)
+    # where a chip is left by the rise: nearer to the sides the edge lifts off
+    z, start, end = np.array([0.0, 1e-3]), np.full(2, 0.2), np.full(2, np.pi - 0.2)
     load = [
         spindle_load(cutter, CuttingConditions(900.0, 1e-3, 1e-4, EngagementMap(z, start, end, rise)), CuttingCoefficients(1e9, 0.3))
         for rise in (0.0, 0.1)
     ]
     # volume = feed times projected area: of the cone's strip along x and of its ring along z
-    level = 1e-4 * np.trapezoid(2.0 * (0.01 + z), z)
-    risen = np.cos(0.1) * level - np.sin(0.1) * 1e-4 * 0.5 * np.pi * (0.011**2 - 0.010**2)
+    level = 1e-4 * np.trapezoid(2.0 * np.cos(0.2) * (0.01 + z), z)
+    risen = np.cos(0.1) * level - np.sin(0.1) * 1e-4 * 0.5 * (np.pi - 0.4) * (0.011**2 - 0.010**2)
     assert load[0].removal_rate == pytest.approx(level * 900.0 / (2.0 * np.pi), rel=1e-9)
     assert load[1].removal_rate == pytest.approx(risen * 900.0 / (2.0 * np.pi), rel=1e-9)
 

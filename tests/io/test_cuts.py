@@ -9,7 +9,7 @@ from rcsa_ident.cutting.conditions import Block, CuttingConditions, Engagement, 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.cuts import CUT_KEYS, cut_keys, cut_of
 from rcsa_ident.io.cutters import CUTTER_KEYS, cutter_of
-from rcsa_ident.io.engagements import read_engagement_map, write_engagement_map
+from rcsa_ident.io.engagements import read_engagement_map
 from rcsa_ident.io.toml_text import keys_of_toml, toml_of
 from rcsa_ident.io.validated_table import Table
 from tests.fixtures import by_hand
@@ -57,8 +57,9 @@ MAP = EngagementMap([0.0, 0.0, 0.001], np.radians([10.0, 90.0, 20.0]), np.radian
 
 
 def test_a_map_is_read_from_a_file_and_row_by_row(tmp_path):
-    write_engagement_map(tmp_path / "M.csv", MAP)
     rows = [[0.0, 10.0, 40.0], [0.0, 90.0, 120.0], [1.0, 20.0, 150.0]]
+    lines = [",".join(map(str, row)) for row in rows]
+    (tmp_path / "M.csv").write_text("\n".join(["z_mm,entry_angle_deg,exit_angle_deg", *lines]) + "\n", "utf-8")
     for told in ("M.csv", rows):
         found = read({"engagement": told, "lead_deg": 15.0, "tilt_deg": 3.0}, "ball", tmp_path).engagement
         for name in ("z", "start", "end"):

@@ -20,7 +20,8 @@ def test_a_step_runs(name):
         "listening": ("signals", "sideband_scores"),
         "lobes": ("stability", "envelopes"),
     }
+    marched = [("stability._depth_kernels", kernel) for kernel in ("boundaries", "lowest", "first_of_ladder")]
     if name in called:
         room, kernel = called[name]
-        function = getattr(importlib.import_module(f"rcsa_ident.{room}._kernels"), kernel)
-        assert getattr(function, "signatures", True)
+        for module, entry in ((f"{room}._kernels", kernel), *(marched if name == "lobes" else ())):
+            assert getattr(getattr(importlib.import_module(f"rcsa_ident.{module}"), entry), "signatures", True)
