@@ -243,7 +243,7 @@ class CutPrior:
     @property
     def rows(self) -> FloatArray:
         """The first four side by side, as the kernel takes them, shape (k, 4)."""
-        return np.ascontiguousarray(self.columns[:, :4])
+        return np.stack([self.delay, self.delay_weight, self.angle_weight, self.tooth_period], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
