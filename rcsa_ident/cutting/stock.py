@@ -8,7 +8,6 @@ import numpy as np
 
 from rcsa_ident.cutting.conditions import AnyEngagement, Block, Engagement, EngagementMap, Stepover
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.shown import Shown
 
@@ -105,6 +104,9 @@ def check_cut(cutter: Cutter, engagement: AnyEngagement, depth: float, feed_per_
     depth : float [m]
     feed_per_tooth : float or None [m]
     """
-    plain = cutter.is_cylinder and isinstance(engagement, Engagement)
-    if not plain and rows_of(cutter, engagement, depth, feed_per_tooth).count == 0:
+    if cutter.is_cylinder and isinstance(engagement, Engagement):
+        return
+    from rcsa_ident.cutting.rows import rows_of  # compiled kernels: cuts of walls are read without them
+
+    if rows_of(cutter, engagement, depth, feed_per_tooth).count == 0:
         raise InputError("engagement", f"{engagement}, depth {1e3 * depth:g} mm", "a cut in which some tooth cuts")

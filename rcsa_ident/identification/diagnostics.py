@@ -117,6 +117,9 @@ def diagnose(
         words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}"
         doubt(IdentificationCode.CONTRADICTING_CUTS, words)
     reasons += further
+    # a cause before what it leads to
+    if not data.of_flange:
+        doubt(IdentificationCode.HOUSING_ALONE, HOUSING_ALONE)
     for axis, band in zip(data.axes, bands, strict=True):
         if band > LARGEST_BAND:
             doubt(
@@ -128,8 +131,6 @@ def diagnose(
         how = "cut with" if data.cuts else "hit"
         words = f"only one tooling: translation and slope of the flange cannot be separated; {how} a second, different holder"
         doubt(IdentificationCode.ONE_TOOLING, words)
-    if not data.of_flange:
-        doubt(IdentificationCode.HOUSING_ALONE, HOUSING_ALONE)
     if FEWEST_TOOLINGS <= len(data.toolings) < FEWEST_OF_HOUSING and not data.of_flange:
         words = (
             f"only {len(data.toolings)} toolings: too little changes on the housing from one to the next to tell what the flange does; cut "

@@ -12,6 +12,8 @@ from rcsa_ident.errors import InputError
 
 #: Two peaks are one pocket unless the level between them falls below this share of the higher one.
 POCKET = 0.85
+#: Levels that differ by less than this share are one.
+SAME = 1e-9
 #: A speed beyond those that were asked for may lie this much below what a tolerance needs, as a share.
 COARSE = 0.9
 #: How far beside a pocket's top a better speed is looked for, and in steps of which share of the speed.
@@ -35,7 +37,8 @@ def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[fl
     """
     order = np.argsort(speed)
     speed, limit = np.asarray(speed)[order], np.asarray(level)[order]
-    edges = np.flatnonzero(np.concatenate([[True], limit[1:] != limit[:-1]]))
+    # what one bound gives at every speed is one plateau, whatever rounding makes of it
+    edges = np.flatnonzero(np.concatenate([[True], ~np.isclose(limit[1:], limit[:-1], rtol=SAME, atol=0.0)]))
     ends = np.concatenate([edges[1:], [limit.size]]) - 1
     level = limit[edges]
     outside = np.concatenate([[-np.inf], level, [-np.inf]])

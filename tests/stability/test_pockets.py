@@ -25,6 +25,12 @@ def test_the_middle_of_a_stable_range_comes_first_the_widest_before_others():
     assert peaks(SPEED, level) == [(500.0, np.inf), (200.0, np.inf), (800.0, 3.0)]
 
 
+def test_what_rounding_tears_apart_is_one_plateau():
+    # power divided by a speed and multiplied by it again
+    level = np.array([1.0, 3.0, np.nextafter(3.0, 4.0), 3.0, 3.0, np.nextafter(3.0, 2.0), 1.0, 2.0, 1.0])
+    assert peaks(SPEED, level) == [(400.0, 3.0), (800.0, 2.0)]
+
+
 def test_order_of_the_speeds_does_not_matter():
     level = np.array([1.0, 3.0, 1.0, 2.0, 1.0])
     assert peaks(SPEED[:5], level) == peaks(SPEED[:5][::-1], level[::-1])

@@ -470,9 +470,17 @@ def test_a_key_is_asked_for_and_forgotten(opened, tmp_path: Path):
         field.fill("ri_wrong_key")
         page.get_by_role("button", name="Use this key").click()
         expect(page.locator("dialog .fault")).to_contain_text("does not take the key")
+        late = []
+        refused = "ri_wrong_key"
+        page.route("**/v1/examples", lambda r: late.append(r) if r.request.headers["x-api-key"] == refused else r.continue_())
+        asked = "(path) => { import(document.querySelector('script[src*=\"main.js\"]').src.replace('main.js', 'api.js'))"
+        page.evaluate(asked + ".then((api) => api.get(path).catch(() => null)); }", "examples")
         page.get_by_label("Key", exact=True).fill(key)
         page.keyboard.press("Enter")
         expect(page.get_by_role("heading", name="Drop a campaign here")).to_be_visible()
+        # a refusal of the wrong key that comes only now says nothing of the one in use
+        with page.expect_response("**/v1/examples"):
+            late[0].fulfill(status=401, json={"detail": "the service does not take the key"})
         assert key not in page.evaluate("JSON.stringify({...localStorage})")
         assert key in page.evaluate("JSON.stringify({...sessionStorage})")
         assert key not in page.url

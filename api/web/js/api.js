@@ -43,15 +43,16 @@ export function once() {
   return { "Idempotency-Key": [...bytes].map((b) => b.toString(16).padStart(2, "0")).join("") };
 }
 
-/** The problem of an answer that is none. */
-export function problemOf(status, text, headers = null) {
+/** The problem of an answer that is none; `used` is the key that it was asked for with. */
+export function problemOf(status, text, headers = null, used = key) {
   let found = null;
   try {
     found = JSON.parse(text);
   } catch {
     // not from the service: a proxy, or nothing at all
   }
-  if (status === 401) window.dispatchEvent(new Event("key-wanted"));
+  // a refusal that comes late, of a key that was replaced meanwhile, says nothing of the one in use
+  if (status === 401 && used === key) window.dispatchEvent(new Event("key-wanted"));
   if (found && typeof found === "object" && found.detail) return new Problem(status, found, headers);
   return new Problem(
     status,
@@ -74,6 +75,7 @@ async function fetched(address, sent) {
 
 /** Send, and return the answer; everything but 2xx and 304 is thrown as a `Problem`. */
 export async function send(method, path, { json, body, headers = {}, signal, keepalive = false } = {}) {
+  const used = key;
   const sent = { method, signal, keepalive, headers: { ...keyHeaders(), ...headers } };
   if (json !== undefined) {
     sent.body = JSON.stringify(json);
@@ -86,7 +88,7 @@ export async function send(method, path, { json, body, headers = {}, signal, kee
     if (error.name === "AbortError") throw error;
     throw problemOf(0, "");
   }
-  if (!answer.ok && answer.status !== 304) throw problemOf(answer.status, await answer.text(), answer.headers);
+  if (!answer.ok && answer.status !== 304) throw problemOf(answer.status, await answer.text(), answer.headers, used);
   return answer;
 }
 
