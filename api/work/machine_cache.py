@@ -124,6 +124,7 @@ def _finite(machine: IdentifiedMachine, omega: np.ndarray) -> bool:
             sides = [side.kept() for side in machine.sides(omega)]
             gives_way = () if machine.workpiece_side is None else machine.workpiece_side.yielding.values()
             beside = [part for each in gives_way for part in (each.receptance(omega), each.changes(omega))]
+            beside += [] if machine.axial is None else [machine.axial.receptance(omega).values]
     except (ArithmeticError, np.linalg.LinAlgError, InputError):
         return False
     ends = [part for side in sides if side.ends is not None for part in (side.ends.ahead, side.ends.behind)]
@@ -138,6 +139,9 @@ def _limits(data: dict[str, Any]) -> None:
     _at_most("speed_bands", bands, MOST_BANDS)
     for key in ("taught_by", "taught_recordings"):
         _at_most(key, data.get(key, []), MOST_TOLD)
+    along = data.get("axial")
+    if isinstance(along, dict) and isinstance(along.get("poles"), list):
+        _at_most("axial.poles", along["poles"], MOST_MODES)
     for table in (data, *bands):
         named = {f"axes.{name}": axis for name, axis in table["axes"].items()}
         named |= {"both_planes": table["both_planes"]} if isinstance(table.get("both_planes"), dict) else {}

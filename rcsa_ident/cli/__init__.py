@@ -81,6 +81,7 @@ _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
         calibrate.materials,
         compare.compare,
         decouple.decouple,
+        decouple.axial,
         contact.contact,
     ),
     "Virtual machine and set-up": (machine.simulate, schema.schema, machine.warm),

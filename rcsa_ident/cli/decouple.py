@@ -1,4 +1,4 @@
-"""decouple: the spindle's flange from hammer tests with several known toolings."""
+"""decouple and axial: the spindle's flange from hammer tests, across its axis with several known toolings, along it with one."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Share of the frequencies at which a flange may be ambiguous or feed energy in without being called suspect.
 _MOST_DOUBTFUL = 0.25
+#: Response and force of a test along the axis.
+_ALONG = ("Z", "Z")
 
 
 @answers
@@ -97,6 +99,66 @@ def decouple(
         say(f"written: {out}" + (f", {plot}" if plot is not None else ""))
     if any(max(f.ambiguous.mean(), (f.dissipation < -1e-3).mean()) > _MOST_DOUBTFUL for f in found.values()):
         raise typer.Exit(NOT_CONVERGED)
+
+
+@answers
+def axial(
+    result: Annotated[Path, typer.Argument(metavar="RESULT.json|FLANGE.csv", help="The machine, across its axis.", show_default=False)],
+    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml that was clamped, any one.", show_default=False)],
+    frf: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE[#RECORD]", help="Hammer test at its tip along the axis: FRF.csv, UFF 58, text columns.", show_default=False
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option(help="RESULT.json or FLANGE.csv to write: the machine with what the tap tells of Z.", show_default=False)
+    ],
+    frf_units: Annotated[
+        str | None, typer.Option(help="Unit of the FRF, as um/N, g/N, (m/s^2)/N; default: as the file states.", show_default=False)
+    ] = None,
+    from_: Annotated[float, typer.Option("--from", help="Lowest frequency that is used, Hz.")] = 100.0,
+    to: Annotated[float | None, typer.Option("--to", help="Highest frequency that is used, Hz; default: all.", show_default=False)] = None,
+    json_: Json = False,
+) -> None:
+    """Learn how the spindle gives way along its axis, from one hammer test of any tooling: cutters whose edges are no wall ask for it."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from rcsa_ident.cli.conditions import frf_source
+    from rcsa_ident.cli.results import read_identified
+    from rcsa_ident.errors import positive
+    from rcsa_ident.io.axial_flanges import axial_to_json
+    from rcsa_ident.io.flanges import read_flange_machine, write_flange_machine
+    from rcsa_ident.io.frf_files import read_tap_tests
+    from rcsa_ident.io.results import write_result
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.decouple import axial_flange_from_tap
+
+    measured = result.suffix.lower() == ".csv"
+    if (writable(out).suffix.lower() == ".csv") != measured:
+        raise InputError("--out", str(out), f"a {'FLANGE.csv' if measured else 'RESULT.json'}, as the machine is one")
+    tapped = read_tooling(tooling)
+    source = frf_source(frf)
+    if source.pair not in (None, _ALONG):
+        raise InputError("FRF", "".join(source.pair), "a test along Z, force and response", str(source.path))
+    frequency, values = read_tap_tests([source._replace(pair=_ALONG)], frf_units)[_ALONG]
+    kept = (frequency >= positive("--from", from_, "Hz")) & (frequency <= (math.inf if to is None else positive("--to", to, "Hz")))
+    learnt = axial_flange_from_tap(tapped, from_hz(frequency[kept]), values[kept])
+    if measured:
+        write_flange_machine(out, replace(read_flange_machine(result), axial=learnt))
+    else:
+        write_result(out, read_identified(result)[1] | {"axial": axial_to_json(learnt)})
+    tip = learnt.receptance(from_hz(frequency[kept])).values[:, 0, 0]
+    stiffness = float(1.0 / np.abs(tip[0]))
+    if json_:
+        emit({"axial": axial_to_json(learnt), "stiffness_n_per_m": stiffness, "warnings": list(learnt.remarks), "out": str(out)})
+        return
+    say(f"{learnt}; {1e-6 * stiffness:.3g} N/µm at {frequency[kept][0]:.0f} Hz")
+    for remark in learnt.remarks:
+        warn(remark)
+    say(f"written: {out}")
 
 
 def _taps(texts: list[str], low: float, high: float) -> dict[Dof, list[FlangeTap]]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.poles import PoleResidue, pair_sum
@@ -155,7 +156,11 @@ def rational_fit(
 
 
 def fitted_poles(
-    omega: FloatArray, values: ComplexArray, tolerance: float = 1e-3, damped_outside: float = 0.0
+    omega: FloatArray,
+    values: ComplexArray,
+    tolerance: float = 1e-3,
+    damped_outside: float = 0.0,
+    noise: FloatArray | None = None,
 ) -> tuple[PoleResidue, float]:
     """Return the poles of a square receptance, and the norm of what is left as a share; planes that do not couple keep their own poles.
 
@@ -164,12 +169,14 @@ def fitted_poles(
     omega : array, shape (n,) [rad/s]
         Others than those above 0 are left aside.
     values : complex array, shape (n, r, r)
-        Where all entries off the diagonal are 0, each diagonal entry is fitted for itself; one that is 0, too, has no poles.
+        Directions that do not couple, directly or through others, are fitted apart; one that is rigid has no poles.
     tolerance : float
         As in `rational_fit`.
     damped_outside : float
         Least damping ratio of poles outside the band: they stand for many modes and are nobody's. Above 0, the constant stands for
         poles far above the band, which would ask whoever marches through time for steps of their own length.
+    noise : array, shape (n, r, r), optional
+        As in `rational_fit`.
 
     Raises
     ------
@@ -178,12 +185,16 @@ def fitted_poles(
     """
     above = omega > 0.0
     omega, values = omega[above], values[above]
+    noise = None if noise is None else noise[above]
     r = values.shape[1]
-    coupled = bool(np.any(values[:, ~np.eye(r, dtype=bool)]))
+    there = np.any(values, axis=0)
     parts = []
-    for rows in [list(range(r))] if coupled else [[i] for i in range(r) if np.any(values[:, i, i])]:
+    count, group = connected_components(there, directed=False)
+    for rows in (np.flatnonzero(group == k) for k in range(count)):
+        if not np.any(there[np.ix_(rows, rows)]):
+            continue
         block = values[:, rows][:, :, rows]
-        fit = rational_fit(omega, block, tolerance=tolerance)
+        fit = rational_fit(omega, block, tolerance=tolerance, noise=None if noise is None else noise[:, rows][:, :, rows])
         unit = np.eye(r)[:, rows]
         parts.append(_damped_outside(fit, omega, block, damped_outside).modes().projected(unit, unit.T))
     if not parts:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -129,8 +129,18 @@ class UncertainReceptance(Receptance):
 
     @property
     def complete(self) -> bool:
-        """Whether there is a spread of every row; only then draws mean something."""
-        return self.variation is not None and len(self.variation.covers) == len(self.rows)
+        """Whether there is a spread of every row that moves; only then draws mean something."""
+        return self.variation is not None and self.variation.covers >= set(np.flatnonzero(np.any(self.values, axis=(0, 2))).tolist())
+
+    def among(self, coordinates: Sequence[Coordinate]) -> UncertainReceptance:
+        """Return the same over further coordinates, its own among them; those that it does not have are rigid."""
+        wanted = tuple(coordinates)
+        own = [wanted.index(c) for c in self.rows]
+        values = np.zeros((self.omega.size, len(wanted), len(wanted)), dtype=complex)
+        values[:, np.array(own)[:, None], own] = self.values
+        variation = None if self.variation is None else _Among(self.variation, tuple(own))
+        poles = None if self.poles is None else partial(_projected, self.poles, np.eye(len(wanted))[:, own])
+        return UncertainReceptance(self.omega, values, wanted, wanted, variation, poles)
 
     def thinned(self) -> UncertainReceptance:
         """Return the same at a part of the frequencies: close where it changes from line to line, far apart where a quintic suffices."""
@@ -166,6 +176,29 @@ class UncertainReceptance(Receptance):
 
     def __str__(self) -> str:
         return f"{Receptance.__str__(self)}{'' if self.variation is None else ', with its spread'}"
+
+
+def _projected(poles: Callable[[], PoleResidue | None], turn: FloatArray) -> PoleResidue | None:
+    found = poles()
+    return None if found is None else found.projected(turn, turn.T)
+
+
+@dataclass(frozen=True, slots=True)
+class _Among:
+    """A spread whose rows stand among others."""
+
+    whole: Spread
+    own: tuple[int, ...]
+
+    @property
+    def covers(self) -> frozenset[int]:
+        return frozenset(self.own[row] for row in self.whole.covers)
+
+    def at(self, places: Places) -> tuple[Variation, ...]:
+        return tuple(replace(each, members=tuple(self.own[m] for m in each.members)) for each in self.whole.at(places))
+
+    def guides(self) -> ComplexArray:
+        return self.whole.guides()
 
 
 @dataclass(frozen=True, slots=True)

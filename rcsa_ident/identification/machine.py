@@ -18,6 +18,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.posterior import MachineAxis, PlaneUnknowns, Posterior
 from rcsa_ident.identification.status import Status
+from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machine.tip import Side
@@ -84,6 +85,8 @@ class IdentifiedMachine(Machine):
         What its cuts told of toolings whose drawings are not exact.
     workpiece_side : WorkpieceSide or None
         What accelerometers on table or workpiece showed.
+    axial : AxialFlange or None
+        What an axial tap showed.
     """
 
     identified: Mapping[Dof, MachineAxis]
@@ -98,6 +101,7 @@ class IdentifiedMachine(Machine):
     whole: CoupledPosterior | None = None
     toolings: KnownToolings | None = None
     workpiece_side: WorkpieceSide | None = None
+    axial: AxialFlange | None = None
     kept_sides: tuple[Side, ...] = field(default=(), repr=False)
 
     @cached_property
@@ -173,7 +177,8 @@ class IdentifiedMachine(Machine):
         """What speaks against everything that is computed with it."""
         doubts = () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
         words = "" if self.workpiece_side is None else self.workpiece_side.words
-        return (*doubts, words) if words else doubts
+        along = () if self.axial is None else self.axial.remarks
+        return (*doubts, *([words] if words else []), *along)
 
     def posteriors(self) -> dict[Dof, Posterior]:
         """Return what is known of each axis by itself.

@@ -18,12 +18,15 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
+from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.units import from_hz, to_hz
 
 #: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.
 _ENTRIES = {"tF": (0, 0), "tM": (0, 1), "rM": (1, 1)}
+#: Columns along the axis.
+_AXIAL = ("Z_tF_re", "Z_tF_im")
 #: Columns of the joint, the same in every line, by the names that they have in RESULT.json.
 _JOINT = tuple(f"joint_{each.name}" for each in fields(LumpedJoint))
 
@@ -34,6 +37,7 @@ def write_flange_csv(
     values: Mapping[Dof, ComplexArray],
     std: Mapping[Dof, FloatArray] | None = None,
     joints: Mapping[Dof, LumpedJoint] | None = None,
+    axial: ComplexArray | None = None,
 ) -> None:
     """Write flange receptances: ``frequency_hz, X_tF_re, X_tF_im, X_tM_re, ..., Y_rM_im`` in m/N, rad/N and rad/(N m).
 
@@ -47,6 +51,8 @@ def write_flange_csv(
     joints : mapping of Dof to LumpedJoint, optional
         Columns ``X_joint_translational_stiffness`` and so on [N/m, N m/rad, N s/m, N m s/rad], of the joint in front of `values`; an axis
         without them has its joint's compliance in `values`.
+    axial : complex array, shape (n,), optional
+        Columns ``Z_tF_re`` and ``Z_tF_im``: along the axis, with the joint's compliance in it.
     """
     columns: dict[str, FloatArray] = {"frequency_hz": np.asarray(frequency_hz, dtype=float)}
     for axis, block in values.items():
@@ -58,6 +64,8 @@ def write_flange_csv(
         if joints is not None and axis in joints:
             parts = zip(_JOINT, astuple(joints[axis]), strict=True)
             columns |= {f"{axis.upper()}_{name}": np.full(columns["frequency_hz"].size, value) for name, value in parts}
+    if axial is not None:
+        columns |= dict(zip(_AXIAL, (axial.real, axial.imag), strict=True))
     table = np.stack(list(columns.values()), axis=1)
     if not np.all(np.isfinite(table)):
         raise InputError("flange receptance", "not finite", "finite numbers", str(path))
@@ -80,7 +88,8 @@ def write_flange_machine(path: str | Path, machine: FlangeMachine) -> None:
         values[axis] = believed.flange.receptance(omega).values
         if believed.joint is not None:
             joints[axis] = believed.joint
-    write_flange_csv(path, np.round(to_hz(omega), 9), values, joints=joints)
+    axial = None if machine.axial is None else machine.axial.receptance(omega).values[:, 0, 0]
+    write_flange_csv(path, np.round(to_hz(omega), 9), values, joints=joints, axial=axial)
 
 
 def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
@@ -112,7 +121,21 @@ def flange_machine_of(text: str, name: str = "flange") -> FlangeMachine:
 
 def _machine(table: TextTable, name: str) -> FlangeMachine:
     flanges = tuple(_flanges(table).values())
-    return FlangeMachine(flanges, flanges[0].band, _joints(table), name, ends=True)
+    return FlangeMachine(flanges, flanges[0].band, _joints(table), name, ends=True, axial=_axial(table))
+
+
+def _axial(table: TextTable) -> AxialFlange | None:
+    """What stands along the axis, where the file has its columns."""
+    if not any(name in table.header for name in _AXIAL):
+        return None
+    missing = [name for name in _AXIAL if name not in table.header]
+    if missing:
+        raise InputError(f"column {missing[0]}", "nothing", "real and imaginary part of Z_tF", table.where)
+    frequency, real, imaginary = table.columns(["frequency_hz", *_AXIAL])
+    try:
+        return AxialFlange.fitted(from_hz(frequency), real + 1j * imaginary)
+    except InputError as error:
+        raise error.at(table.where) from None
 
 
 def _joints(table: TextTable) -> dict[Dof, LumpedJoint] | None:

@@ -17,6 +17,7 @@ from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, workpiece_after
 from rcsa_ident.identification.status import Status
+from rcsa_ident.io.axial_flanges import axial_of
 from rcsa_ident.io.both_planes import both_planes_from_json, both_planes_to_json
 from rcsa_ident.io.drawings import axis_toolings_of, axis_toolings_to_json, known_toolings_of, known_toolings_to_json
 from rcsa_ident.io.results import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
@@ -231,6 +232,7 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         whole=_whole(top),
         toolings=toolings,
         workpiece_side=workpiece_side_of(top),
+        axial=axial_of(top),
     )
 
 

@@ -13,10 +13,10 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange, independent_parts
 from rcsa_ident.machine.machine import STEP, Machine
 from rcsa_ident.machine.measured import MeasuredFlange
-from rcsa_ident.remarks import Remark
 from rcsa_ident.units import to_hz
 
 
@@ -36,6 +36,8 @@ class FlangeMachine(Machine):
     name : str
     ends : bool
         Whether nothing at all is known beyond `known`, as of a measurement.
+    axial : AxialFlange or None
+        What an axial tap showed.
 
     Examples
     --------
@@ -52,6 +54,7 @@ class FlangeMachine(Machine):
     joint: LumpedJoint | Mapping[Dof, LumpedJoint] | None = None
     name: str = "flange"
     ends: bool = False
+    axial: AxialFlange | None = None
 
     def __post_init__(self) -> None:
         if not self.flanges or not 0.0 <= self.known[0] < self.known[1]:
@@ -73,9 +76,9 @@ class FlangeMachine(Machine):
         return tuple(found)
 
     @cached_property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """What speaks against everything that is computed with it: frequencies of a measurement that lie too far apart."""
-        found = []
+        found: list[str] = []
         for flange in self.flanges:
             if isinstance(flange, MeasuredFlange):
                 low, high = max(flange.band[0], self.known[0]), min(flange.band[1], self.known[1])
@@ -83,7 +86,7 @@ class FlangeMachine(Machine):
                 remark = flange.coarse(omega[(omega >= low) & (omega <= high)])
                 if remark is not None:
                     found.append(remark.of(", ".join(c.dof.upper() for c in flange.coordinates if not c.dof.is_slope)))
-        return tuple(found)
+        return (*found, *(() if self.axial is None else self.axial.remarks))
 
     def _joint(self, group: tuple[Coordinate, ...]) -> LumpedJoint | None:
         if not isinstance(self.joint, Mapping):

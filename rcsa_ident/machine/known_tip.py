@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.stability.lobes import uncoupled_planes
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.units import from_hz, to_hz
 
@@ -79,9 +79,10 @@ class KnownTip(TipSource):
         omega: FloatArray | None = None,
         spread: bool = True,
         stiffness_spread: float = STIFFNESS_SPREAD,
+        directions: Sequence[Coordinate] = TIP,
     ) -> UncertainReceptance | TipModes:
         """Return the tip as it is known, whatever tooling is named."""
-        del tooling, omega, spread, stiffness_spread
+        del tooling, omega, spread, stiffness_spread, directions
         if isinstance(self.known, TipModes):
             return self.known
         return UncertainReceptance(self.known.omega, self.known.values, self.known.rows, self.known.cols)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,13 +11,14 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.stability.label_posterior import FEWEST, LabelModel, LabelPosterior
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import TestedCuts
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.stability.uncertain_tip import TipLimits, UncertainTip
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 
@@ -84,9 +86,10 @@ class LearntTip(TipSource):
         omega: FloatArray | None = None,
         spread: bool = True,
         stiffness_spread: float = STIFFNESS_SPREAD,
+        directions: Sequence[Coordinate] = TIP,
     ) -> TipModes:
         """Return the modes in the middle of all draws, whatever tooling is named."""
-        del tooling, omega, spread, stiffness_spread
+        del tooling, omega, spread, stiffness_spread, directions
         return self.middle
 
     def drawn_limits(self, process: MillingProcess, speeds: FloatArray, max_depth: float, draws: int) -> tuple[FloatArray, FloatArray]:

@@ -18,14 +18,15 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.mode_synthesis import poles_of
 from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
-from rcsa_ident.machine.tip import Side, tip_over_sides
+from rcsa_ident.machine.tip import Behind, Side, tip_over
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.shown import Drawn, Shown
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes
 from rcsa_ident.tool_holder.drawings import FittedDrawing, KnownToolings, fitted
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
@@ -33,6 +34,8 @@ from rcsa_ident.tool_holder.turning import turning_receptance
 
 #: Lower end of the receptances that limits are computed from, and their step [Hz].
 LOWEST, STEP = 100.0, 1.0
+#: The tip along the axis.
+AXIAL_TIP = DIRECTIONS[2]
 #: Relative standard deviation of a tool-holder's stiffness that stands for its mesh.
 STIFFNESS_SPREAD = 5e-4
 
@@ -64,6 +67,11 @@ class TipSource(Shown, ABC):
     def coupled_planes(self) -> bool:
         """Whether X and Y feel each other, as far as that is known."""
         return False
+
+    @property
+    def translations(self) -> tuple[Coordinate, ...]:
+        """Axes along which the tip is known to move."""
+        return TIP
 
     @property
     def prepared(self) -> bool:
@@ -105,8 +113,9 @@ class TipSource(Shown, ABC):
         omega: FloatArray | None = None,
         spread: bool = True,
         stiffness_spread: float = STIFFNESS_SPREAD,
+        directions: Sequence[Coordinate] = TIP,
     ) -> UncertainReceptance | TipModes:
-        """Return what the tip of a tooling does."""
+        """Return what the tip of a tooling does, in directions that a machine may be asked for; see `Machine.tip`."""
 
     def relative_tip(
         self,
@@ -114,9 +123,10 @@ class TipSource(Shown, ABC):
         omega: FloatArray | None = None,
         spread: bool = True,
         stiffness_spread: float = STIFFNESS_SPREAD,
+        directions: Sequence[Coordinate] = TIP,
     ) -> UncertainReceptance | TipModes:
         """Return what the tip does relative to the workpiece: what a chip feels, and limits are computed from; parameters as of `tip`."""
-        return self.tip(tooling, omega, spread, stiffness_spread)
+        return self.tip(tooling, omega, spread, stiffness_spread, directions)
 
 
 class Machine(TipSource, Drawn):
@@ -130,6 +140,8 @@ class Machine(TipSource, Drawn):
     toolings: KnownToolings | None = None
     #: What gives way under the workpiece, where accelerometers showed it; None where it is taken as rigid.
     workpiece_side: WorkpieceSide | None = None
+    #: What gives way behind the flange along the spindle's axis, where an axial tap showed it; None where that is taken as rigid.
+    axial: AxialFlange | None = None
 
     @property
     @abstractmethod
@@ -162,8 +174,13 @@ class Machine(TipSource, Drawn):
 
     @property
     def axes(self) -> tuple[Dof, ...]:
-        """Machine axes along which the tip moves."""
+        """Machine axes of the bending planes, along which the tip moves."""
         return tuple(c.dof for c in self.coordinates if not c.dof.is_slope)
+
+    @property
+    def translations(self) -> tuple[Coordinate, ...]:
+        """Axes along which the tip is known to move: X, Y, and Z after an axial tap."""
+        return (*(Coordinate("tip", axis) for axis in self.axes), *(() if self.axial is None else (AXIAL_TIP,)))
 
     def lines(self, beyond: float = 1.0) -> FloatArray:
         """Return frequencies [rad/s] 1 Hz apart, from 100 Hz or below up to so many times the highest at which the machine is known."""
@@ -229,6 +246,7 @@ class Machine(TipSource, Drawn):
         omega: FloatArray | None = None,
         spread: bool = True,
         stiffness_spread: float = STIFFNESS_SPREAD,
+        directions: Sequence[Coordinate] = TIP,
     ) -> UncertainReceptance:
         """Return the tip's receptance of a tooling on the machine, over ``tip.x`` and ``tip.y`` with their cross terms.
 
@@ -241,12 +259,26 @@ class Machine(TipSource, Drawn):
             With what is not known of the machine, where something is; it is computed where it is asked for.
         stiffness_spread : float
             Standard deviation of the tool-holder's stiffness, as a share: the mesh alone by default; 0.01 for a modulus from a handbook.
+        directions : sequence of Coordinate, default ``tip.x`` and ``tip.y``
+            Of the tip; those beyond the default are asked for by cutters whose edges are no wall. Slopes of both planes, or none;
+            ``tip.z`` is rigid unless an axial tap has told what stands behind the tool-holder along its axis.
+
+        Returns
+        -------
+        UncertainReceptance
+            Over the directions that the machine knows; over all that were asked for where these are X, Y and more.
         """
         sides = self.sides(self.lines() if omega is None else omega)
         drawing, turning = self.fitted(tooling), self.turning
-        tip = tip_over_sides(sides, drawing, stiffness_spread, turning)
+        slopes = any(c.dof.is_slope for c in directions)
+        if self.axial is not None and AXIAL_TIP in directions:
+            sides = (*sides, Side.of(self.axial.part, sides[0].omega))
+        tip = tip_over(Behind(sides, turning, slopes), drawing, stiffness_spread)
         if len(sides) == 1:
-            tip = replace(tip, poles=partial(poles_of, drawing.assembly, sides[0].part.believed, float(tip.omega[-1]), turning))
+            highest = float(tip.omega[-1])
+            tip = replace(tip, poles=partial(poles_of, drawing.assembly, sides[0].part.believed, highest, turning, slopes))
+        if set(directions) > set(TIP):
+            tip = tip.among(directions)
         return tip if spread else replace(tip, variation=None)
 
     def relative_tip(
@@ -255,9 +287,10 @@ class Machine(TipSource, Drawn):
         omega: FloatArray | None = None,
         spread: bool = True,
         stiffness_spread: float = STIFFNESS_SPREAD,
+        directions: Sequence[Coordinate] = TIP,
     ) -> UncertainReceptance:
         """Return the receptance between the tip and the workpiece, C11 + G_w: the tip's own where nothing else gives way."""
-        tip = self.tip(tooling, omega, spread, stiffness_spread)
+        tip = self.tip(tooling, omega, spread, stiffness_spread, directions)
         if self.workpiece_side is None:
             return tip
         relative = self.workpiece_side.beside(tip)

@@ -25,9 +25,9 @@ BEYOND = 2.0
 
 
 def synthesised_poles(
-    holder: TurningToolHolder, flange: TurningModes, joint: LumpedJoint | None, turning: float | None
+    holder: TurningToolHolder, flange: TurningModes, joint: LumpedJoint | None, turning: float | None, slopes: bool = False
 ) -> PoleResidue | None:
-    """Return the tip's 2 x 2 receptance of a tool-holder on a machine as poles, or None where joint and residual hold rigidly.
+    """Return the tip's receptance of a tool-holder on a machine as poles, or None where joint and residual hold rigidly.
 
     Parameters
     ----------
@@ -37,6 +37,8 @@ def synthesised_poles(
     joint : LumpedJoint or None
     turning : float or None [rad/s]
         Spindle speed of the tool-holder's gyroscopic moments; None leaves them out.
+    slopes : bool
+        Over translation and slope of each plane, instead of both translations.
 
     Notes
     -----
@@ -52,11 +54,12 @@ def synthesised_poles(
     n = 2 * h + m
     planes = (slice(0, h), slice(h, 2 * h))
     stiffness, damping, loss, moments = (np.zeros((n, n)) for _ in range(4))
-    gap, tip = np.zeros((4, n)), np.zeros((2, n))
+    seen = 2 if slopes else 1
+    gap, tip = np.zeros((4, n)), np.zeros((2 * seen, n))
     for k, own in enumerate(planes):
         stiffness[own, own], loss[own, own], damping[own, own] = holder.stiffness.real, holder.stiffness.imag, holder.damping
         gap[2 * k : 2 * k + 2, own] = holder.ports[2:]
-        tip[k, own] = holder.ports[0]
+        tip[seen * k : seen * (k + 1), own] = holder.ports[:seen]
     across = 0.0 if turning is None else 2.0 * turning
     moments[planes[0], planes[1]], moments[planes[1], planes[0]] = -across * holder.rotary, across * holder.rotary
     own = slice(2 * h, n)
@@ -65,11 +68,13 @@ def synthesised_poles(
     squares, shapes = scipy.linalg.eigh(stiffness + gap.T @ spring @ gap)
     natural = np.sqrt(squares)
     viscous = shapes.T @ (damping + gap.T @ damper @ gap) @ shapes + shapes.T @ loss @ shapes / np.sqrt(np.outer(natural, natural))
-    poles = gyroscopic_poles(natural, viscous, shapes.T @ moments @ shapes, (tip @ shapes).T, np.zeros((2, 2)))
+    poles = gyroscopic_poles(natural, viscous, shapes.T @ moments @ shapes, (tip @ shapes).T, np.zeros((2 * seen, 2 * seen)))
     return _within(poles, BEYOND * holder.highest)
 
 
-def poles_of(assembly: ToolAssembly, believed: JointedFlange, highest: float, turning: float | None) -> PoleResidue | None:
+def poles_of(
+    assembly: ToolAssembly, believed: JointedFlange, highest: float, turning: float | None, slopes: bool = False
+) -> PoleResidue | None:
     """Return the same of a flange and the joint in front of it, or None where it does not stand in modes.
 
     Parameters
@@ -81,12 +86,14 @@ def poles_of(assembly: ToolAssembly, believed: JointedFlange, highest: float, tu
         Up to which the tip is asked for.
     turning : float or None [rad/s]
         Spindle speed of the tool-holder's gyroscopic moments; None leaves them out.
+    slopes : bool
+        As in `synthesised_poles`.
     """
     flange = believed.flange
     if not isinstance(flange, TurningModes) or flange.coordinates != FLANGE:
         return None
     holder = turning_tool_holder(assembly, highest, 0.0 if turning is None else turning)
-    return synthesised_poles(holder, flange, believed.joint, turning)
+    return synthesised_poles(holder, flange, believed.joint, turning, slopes)
 
 
 def _spring(flange: TurningModes, joint: LumpedJoint | None) -> tuple[FloatArray, FloatArray] | None:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.uncertain import AtNodes, Mixed, UncertainReceptance, curves_of, nodes_of
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.methods import coarse_to_fine
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 
+#: Places of some speeds, and the tip that they share.
+Tips = Iterator[tuple[NDArray[np.intp], UncertainReceptance | TipModes]]
 #: Speeds of one block share one tip receptance: relative width of a block. On a spindle that turns (gyroscopic moments alone, 6000 to
 #: 22 000 rev/min in 321 speeds, 53 tips) limits are off by 1e-4 in the median and 8e-4 at the most; errors go with the width.
 BLOCK = 0.025
@@ -30,7 +33,8 @@ def tips_over_speed(
     speeds: FloatArray,
     spread: bool = True,
     stiffness_spread: float = STIFFNESS_SPREAD,
-) -> Iterator[tuple[NDArray[np.intp], UncertainReceptance | TipModes]]:
+    directions: Sequence[Coordinate] = TIP,
+) -> Tips:
     """Yield the tip, relative to the workpiece, for each block of speeds that share one, beside the places of these speeds.
 
     Blocks that lie far apart come first.
@@ -47,14 +51,20 @@ def tips_over_speed(
         With what is not known of the machine.
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
+    directions : sequence of Coordinate
+        Of the tip, as `Machine.tip` takes them.
     """
+
+    def tip_of(model: TipSource, spread: bool) -> UncertainReceptance | TipModes:
+        return model.relative_tip(tooling, omega, spread, stiffness_spread, directions)
+
     for model, places in machine.models(speeds):
         own, known = speeds[places], model.speed_range
         if known is None:
-            yield places, model.relative_tip(tooling, omega, spread, stiffness_spread)
+            yield places, tip_of(model, spread)
             continue
         blocks = _blocks(own, known)
-        tips = _ChangingTip(model, tooling, omega, own, known, spread, stiffness_spread)
+        tips = _ChangingTip(model, tip_of, own, known, spread)
         middles = [tips.middle(own[block]) for block in blocks]
         if tips.coupled:
             tips.share_nodes(middles)
@@ -74,14 +84,12 @@ class _ChangingTip:
     def __init__(
         self,
         model: TipSource,
-        tooling: Tooling | ToolAssembly,
-        omega: FloatArray,
+        tip_of: Callable[[TipSource, bool], UncertainReceptance | TipModes],
         speeds: FloatArray,
         known: tuple[float, float],
         spread: bool,
-        stiffness_spread: float,
     ) -> None:
-        self.model, self.tooling, self.omega, self.known, self.stiffness_spread = model, tooling, omega, known, stiffness_spread
+        self.model, self.tip_of, self.known = model, tip_of, known
         self.anchors, self.tips = np.zeros(0), list[UncertainReceptance | TipModes]()
         self.own = dict[float, UncertainReceptance | TipModes]()
         if spread:
@@ -91,7 +99,7 @@ class _ChangingTip:
             self.tips = [self._tip(speed, True) for speed in self.anchors.tolist()]
 
     def _tip(self, speed: float, spread: bool) -> UncertainReceptance | TipModes:
-        return self.model.at(speed).relative_tip(self.tooling, self.omega, spread, self.stiffness_spread)
+        return self.tip_of(self.model.at(speed), spread)
 
     def middle(self, speeds: FloatArray) -> float:
         """Return the middle of a block's speeds, as far as they are known."""

@@ -6,7 +6,6 @@ computed where they are asked for, and those of W, which are the same for every 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -21,12 +20,14 @@ from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.drawings import FittedDrawing
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_poles
+from rcsa_ident.tool_holder.rods import axial_poles
 from rcsa_ident.tool_holder.turning import both_planes, entries_at_speed
 
-#: Of a tool-holder's receptances (translation and slope of the tip, then of the flange): tip, tip over flange, flange over tip, flange.
+#: Of a tool-holder's receptances (translation and slope of the tip, then of the flange) those that the tip's translation asks for: tip,
+#: tip over flange, flange over tip, flange.
 _ENTRIES = ((0, 0), (0, 2), (0, 3), (2, 0), (3, 0), (2, 2), (2, 3), (3, 2), (3, 3))
-#: The same of receptances that are symmetric.
-_SYMMETRIC = ((0, 0), (0, 2), (0, 3), (2, 2), (2, 3), (3, 3))
+#: All of them, row by row.
+_ALL = tuple((i, j) for i in range(4) for j in range(4))
 
 
 #: What the fields of an alteration belong to.
@@ -93,9 +94,13 @@ class Side:
         return len(self.part.coordinates) == 2
 
     @property
-    def axes(self) -> tuple[Coordinate, ...]:
-        """The tip's translations that it moves."""
-        return tuple(Coordinate("tip", c.dof) for c in self.part.coordinates if not c.dof.is_slope)
+    def axial(self) -> bool:
+        """Whether it is what stands behind the tool-holder along its axis."""
+        return len(self.part.coordinates) == 1
+
+    def moves(self, slopes: bool = False) -> tuple[Coordinate, ...]:
+        """Return the tip's directions that it moves: translations, with the slopes if asked."""
+        return tuple(Coordinate("tip", c.dof) for c in self.part.coordinates if slopes or not c.dof.is_slope)
 
     def doubted(self) -> Side:
         """Return the same with what is not known of it, without the steps' ends."""
@@ -135,118 +140,177 @@ def _laid(w: ComplexArray, single: bool) -> ComplexArray:
     return np.stack([w[:, 0, 0], 0.5 * (w[:, 0, 1] + w[:, 1, 0]), w[:, 1, 1]], axis=1) if single else w
 
 
+def _spread_out(laid: ComplexArray) -> ComplexArray:
+    """The W of a plane that was laid so, shape (n, p, 3) -> (p, n, 2, 2)."""
+    return np.ascontiguousarray(laid[:, :, [[0, 1], [1, 2]]].transpose(1, 0, 2, 3))
+
+
 def _planes(w: ComplexArray) -> ComplexArray:
     """The same with the frequencies last, shape (..., n, 2, 2) -> (..., 3, n)."""
     return np.stack([w[..., 0, 0], 0.5 * (w[..., 0, 1] + w[..., 1, 0]), w[..., 1, 1]], axis=-2)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Holder:
-    """A tool-holder's free receptances between tip and flange, alike in both bending planes.
+    """A tool-holder's free receptances between tip and flange, as a part of the machine needs them.
 
     Parameters
     ----------
-    assembly : ToolAssembly
-    omega : array, shape (n,) [rad/s]
-    highest : float or None [rad/s]
-        Frequency up to which mesh and modes are good; that of `omega` by default.
+    blocks : complex arrays, shapes (n, a, a), (n, a, b), (n, b, a), (n, b, b)
+        A11, A12, A21, A22 over a directions of the tip and b of the flange.
     """
 
-    def __init__(self, assembly: ToolAssembly, omega: FloatArray, highest: float | None = None) -> None:
-        free = tool_holder_poles(assembly, float(omega[-1]) if highest is None else highest).entries(omega, _ENTRIES)
-        to, back = free[1:3], free[3:5]
-        self.free = free
-        self.tip_tip, self.flange = free[0].copy(), np.stack([free[5], 0.5 * (free[6] + free[7]), free[8]])
-        self.carried = np.stack([to[0] * back[0], to[0] * back[1] + to[1] * back[0], to[1] * back[1]])
+    blocks: tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]
 
     def at(self, places: Places) -> Holder:
         """Return the same at some of the frequencies."""
-        part = object.__new__(Holder)
-        part.free = self.free[:, places]
-        part.tip_tip, part.flange, part.carried = self.tip_tip[places], self.flange[:, places], self.carried[:, places]
-        return part
+        a11, a12, a21, a22 = (each[places] for each in self.blocks)
+        return Holder((a11, a12, a21, a22))
 
     def tip(self, w: ComplexArray) -> ComplexArray:
-        """Return C11 of the translations for W, shape (..., n, b, b) -> (..., n, b / 2, b / 2), at this holder's frequencies."""
-        if w.shape[-1] == 2:
-            rows = np.ascontiguousarray(_planes(w))
-            found: ComplexArray = tips_over(self.tip_tip, self.flange, self.carried, rows.reshape(-1, *rows.shape[-2:]))
-            return found.reshape(*w.shape[:-2], 1, 1)
-        return self._tip_of_planes(w)
-
-    def _tip_of_planes(self, w: ComplexArray) -> ComplexArray:
-        """The same where planes feel each other."""
-        tip_tip, forward, back, middle = self.blocks(w.shape[-1] // 2)
-        found: ComplexArray = tip_tip - forward @ np.linalg.solve(middle + w, np.broadcast_to(back, (*w.shape[:-1], back.shape[-1])))
-        return found
-
-    def blocks(self, count: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """Return A11, A12, A21, A22 of some planes, which it does not couple, shapes (n, a, a), (n, a, 2 a), (n, 2 a, a), (n, 2 a, 2 a)."""
-        n = self.tip_tip.size
-        unit = np.eye(count)
-        a12, a21, a22 = self.free[1:3].T, self.free[3:5].T, self.free[5:9].T.reshape(n, 2, 2)
-        forward = np.einsum("ab,ni->nabi", unit, a12).reshape(n, count, 2 * count)
-        back = np.einsum("ab,ni->naib", unit, a21).reshape(n, 2 * count, count)
-        middle = np.einsum("ab,nij->naibj", unit, a22).reshape(n, 2 * count, 2 * count)
-        return self.tip_tip[:, None, None] * unit, forward, back, middle
+        """Return C11 for W, shape (..., n, b, b) -> (..., n, a, a), at this holder's frequencies."""
+        # the kernel is compiled anew for read-only arrays: a copy is none
+        found: ComplexArray = tips_of_planes(*self.blocks, np.array(w.reshape(-1, *w.shape[-3:])))
+        return found.reshape(*w.shape[:-2], *found.shape[-2:])
 
     def changes(self, side: Side, places: Places) -> ComplexArray:
-        """Return C11's change along each step of a part, shape (p, k, b / 2, b / 2), per standard deviation; places are this holder's."""
+        """Return C11's change along each step of a part, shape (p, k, a, a), per standard deviation; places are this holder's."""
         assert side.doubt is not None
         weight = np.array([step.weight for step in side.doubt.steps])
         ends, own = side.ends_at(places)
-        if side.single:
-            if weight.size == 0:
-                return np.zeros((0, places.size, 1, 1), dtype=complex)
-            found: ComplexArray = tip_changes(self.tip_tip, self.flange, self.carried, ends.ahead, ends.behind, weight, own)
-            return found[:, :, None, None]
-        _, forward, back, middle = self.blocks(len(side.axes))
-        across: ComplexArray = changes_of_planes(forward, back, middle, ends.ahead, ends.behind, weight, own)
-        return across
+        ahead, behind = (_spread_out(each) if side.single else each for each in (ends.ahead, ends.behind))
+        found: ComplexArray = changes_of_planes(*self.blocks[1:], ahead, behind, weight, own)
+        return found
 
 
-class TurningHolder(Holder):
-    """A tool-holder that turns with the spindle: its gyroscopic moments couple both planes.
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneHolder:
+    """The same of one bending plane and the tip's translation alone, in closed form.
 
     Parameters
     ----------
-    assembly : ToolAssembly
-    omega : array, shape (n,) [rad/s]
-    speed : float [rad/s]
-        Of the spindle.
-    axes : tuple of Coordinate
-        The tip's translations, in their order.
+    tip_tip : complex array, shape (n,)
+    flange, carried : complex arrays, shape (3, n)
+        As `rcsa_ident.coupling._kernels.tips_over` takes them.
     """
 
-    def __init__(self, assembly: ToolAssembly, omega: FloatArray, speed: float, axes: tuple[Coordinate, ...]) -> None:
-        dofs = tuple(c.dof for c in axes)
-        if set(dofs) != {Dof.X, Dof.Y}:
-            raise InputError("machine", f"known along {', '.join(dofs)}", "both bending planes: a tool-holder that turns couples them")
-        # from +Y to +X is backwards for whoever calls Y the first axis
-        sense = 1.0 if dofs[0] is Dof.X else -1.0
-        pair = entries_at_speed(assembly, omega, sense * speed, _SYMMETRIC)
+    tip_tip: ComplexArray
+    flange: ComplexArray
+    carried: ComplexArray
 
-        def block(*places: tuple[int, ...]) -> ComplexArray:
-            of_each = [np.moveaxis(each[np.array(places)], -1, 0) for each in pair]
-            return np.ascontiguousarray(both_planes(of_each[0], of_each[1]))
+    @classmethod
+    def of(cls, free: ComplexArray) -> PlaneHolder:
+        """Return a plane of the entries `_ENTRIES`, shape (9, n)."""
+        to, back = free[1:3], free[3:5]
+        carried = np.stack([to[0] * back[0], to[0] * back[1] + to[1] * back[0], to[1] * back[1]])
+        return cls(free[0].copy(), np.stack([free[5], 0.5 * (free[6] + free[7]), free[8]]), carried)
 
-        self.all = block((0,)), block((1, 2)), block((1,), (2,)), block((3, 4), (4, 5))
-
-    def at(self, places: Places) -> Holder:
+    def at(self, places: Places) -> PlaneHolder:
         """Return the same at some of the frequencies."""
-        part = object.__new__(TurningHolder)
-        part.all = tuple(np.ascontiguousarray(each[places]) for each in self.all)  # type: ignore[assignment]
-        return part
+        return PlaneHolder(self.tip_tip[places], self.flange[:, places], self.carried[:, places])
 
     def tip(self, w: ComplexArray) -> ComplexArray:
-        """Return C11 of the translations for W, shape (..., n, 4, 4) -> (..., n, 2, 2), at this holder's frequencies."""
-        # the kernel is compiled anew for read-only arrays: a copy is none
-        found: ComplexArray = tips_of_planes(*self.all, np.array(w.reshape(-1, *w.shape[-3:])))
-        return found.reshape(*w.shape[:-2], 2, 2)
+        """Return C11 for W, shape (..., n, 2, 2) -> (..., n, 1, 1), at this holder's frequencies."""
+        rows = np.ascontiguousarray(_planes(w))
+        found: ComplexArray = tips_over(self.tip_tip, self.flange, self.carried, rows.reshape(-1, *rows.shape[-2:]))
+        return found.reshape(*w.shape[:-2], 1, 1)
 
-    def blocks(self, count: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """Return A11, A12, A21, A22 of both planes."""
-        del count
-        return self.all
+    def changes(self, side: Side, places: Places) -> ComplexArray:
+        """Return C11's change along each step of a part, shape (p, k, 1, 1), per standard deviation; places are this holder's."""
+        assert side.doubt is not None
+        weight = np.array([step.weight for step in side.doubt.steps])
+        if weight.size == 0:
+            return np.zeros((0, places.size, 1, 1), dtype=complex)
+        ends, own = side.ends_at(places)
+        found: ComplexArray = tip_changes(self.tip_tip, self.flange, self.carried, ends.ahead, ends.behind, weight, own)
+        return found[:, :, None, None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Behind:
+    """What stands behind a tool-holder, and which directions of its tip are asked for.
+
+    Parameters
+    ----------
+    sides : tuple of Side
+    turning : float or None [rad/s]
+        Spindle speed of the tool-holder's gyroscopic moments, which couple the planes: both are one part then. None leaves them out.
+    slopes : bool
+        The tip's slopes beside its translations.
+    """
+
+    sides: tuple[Side, ...]
+    turning: float | None = None
+    slopes: bool = False
+
+    def holders(self, assembly: ToolAssembly, omega: FloatArray, highest: float | None = None) -> tuple[Holder | PlaneHolder, ...]:
+        """Return a tool-holder at some frequencies as each part needs it.
+
+        Parameters
+        ----------
+        assembly : ToolAssembly
+        omega : array, shape (n,) [rad/s]
+        highest : float or None [rad/s]
+            Frequency up to which mesh and modes are good; that of `omega` by default.
+        """
+        made: dict[int, Holder | PlaneHolder] = {}
+        highest = float(omega[-1]) if highest is None else highest
+        for side in self.sides:
+            size = len(side.part.coordinates)
+            if size not in made:
+                made[size] = self._holder(side, assembly, omega, highest)
+        return tuple(made[len(side.part.coordinates)] for side in self.sides)
+
+    def _holder(self, side: Side, assembly: ToolAssembly, omega: FloatArray, highest: float) -> Holder | PlaneHolder:
+        if side.axial:
+            free = axial_poles(assembly, highest).receptance(omega).values
+            return Holder(_cut(free, 1, 1))
+        if self.turning is not None:
+            return _turning_holder(assembly, omega, self.turning, side, self.slopes)
+        poles = tool_holder_poles(assembly, highest)
+        if side.single and not self.slopes:
+            return PlaneHolder.of(poles.entries(omega, _ENTRIES))
+        planes = len(side.part.coordinates) // 2
+        free = poles.entries(omega, _ALL).T.reshape(-1, 4, 4)
+        kept = [0, 1, 2, 3] if self.slopes else [0, 2, 3]
+        free = free[:, kept][:, :, kept]
+        tip, flange = len(kept) - 2, 2
+        n, unit = omega.size, np.eye(planes)
+        a11, a12, a21, a22 = _cut(free, tip, flange)
+
+        def apart(block: ComplexArray) -> ComplexArray:
+            """Planes that the tool-holder does not couple."""
+            r, c = block.shape[1:]
+            return np.einsum("ab,nij->naibj", unit, block).reshape(n, planes * r, planes * c)
+
+        return Holder((apart(a11), apart(a12), apart(a21), apart(a22)))
+
+
+def _cut(free: ComplexArray, tip: int, flange: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+    """A11, A12, A21, A22 of receptances over directions of the tip, then of the flange."""
+    rows = slice(0, tip), slice(tip, tip + flange)
+    a11, a12, a21, a22 = (np.ascontiguousarray(free[:, r, c]) for r in rows for c in rows)
+    return a11, a12, a21, a22
+
+
+def _turning_holder(assembly: ToolAssembly, omega: FloatArray, speed: float, side: Side, slopes: bool) -> Holder:
+    """A tool-holder that turns with the spindle: its gyroscopic moments couple both planes."""
+    dofs = tuple(c.dof for c in side.moves())
+    if set(dofs) != {Dof.X, Dof.Y}:
+        raise InputError("machine", f"known along {', '.join(dofs)}", "both bending planes: a tool-holder that turns couples them")
+    # from +Y to +X is backwards for whoever calls Y the first axis
+    sense = 1.0 if dofs[0] is Dof.X else -1.0
+    tip, flange = (0, 1) if slopes else (0,), (2, 3)
+    # a receptance of a plane that turns is symmetric
+    wanted = sorted({(min(i, j), max(i, j)) for i in (*tip, *flange) for j in (*tip, *flange)})
+    pair = entries_at_speed(assembly, omega, sense * speed, wanted)
+
+    def block(rows: tuple[int, ...], cols: tuple[int, ...]) -> ComplexArray:
+        places = np.array([[wanted.index((min(i, j), max(i, j))) for j in cols] for i in rows])
+        forward, backward = (np.moveaxis(each[places], -1, 0) for each in pair)
+        return np.ascontiguousarray(both_planes(forward, backward))
+
+    return Holder((block(tip, tip), block(tip, flange), block(flange, tip), block(flange, flange)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,63 +319,59 @@ class TipSpread:
 
     Parameters
     ----------
-    sides : sequence of Side
-    members : tuple of (tuple of int), one for each side
-        Where its translations stand in the tip's receptance.
-    holder : Holder
+    behind : Behind
+    members : tuple of (tuple of int), one for each part
+        Where its directions stand in the tip's receptance.
+    holders : tuple of Holder or PlaneHolder
     drawing : FittedDrawing
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
-    turning : float or None [rad/s]
-        Spindle speed of the tool-holder's gyroscopic moments.
     """
 
-    sides: Sequence[Side]
+    behind: Behind
     members: tuple[tuple[int, ...], ...]
-    holder: Holder
+    holders: tuple[Holder | PlaneHolder, ...]
     drawing: FittedDrawing
     stiffness_spread: float
-    turning: float | None = None
 
     @property
     def covers(self) -> frozenset[int]:
         """Rows of the tip's receptance that vary."""
-        return frozenset(m for _, members in self._varying for m in members)
+        return frozenset(m for k in self._varying for m in self.members[k])
 
     @property
-    def _varying(self) -> list[tuple[Side, tuple[int, ...]]]:
-        both = zip(self.sides, self.members, strict=True)
-        return [(side, members) for side, members in both if side.part.doubt is not None or self.drawing.ends]
+    def _varying(self) -> list[int]:
+        # along the axis the machine is taken for exact: only what is not known of the tool-holder moves the tip
+        return [k for k, side in enumerate(self.behind.sides) if side.part.doubt is not None or self.drawing.ends or side.axial]
 
     @cached_property
-    def _known(self) -> list[tuple[Side, tuple[int, ...]]]:
-        return [(side.doubted(), members) for side, members in self._varying]
+    def _known(self) -> dict[int, Side]:
+        return {k: self.behind.sides[k].doubted() for k in self._varying}
 
     @cached_property
-    def _ends(self) -> list[tuple[Holder, Holder]]:
+    def _ends(self) -> list[tuple[tuple[Holder | PlaneHolder, ...], ...]]:
         """The tool-holder a standard deviation ahead and behind along all that its drawing leaves open."""
-        omega = self.sides[0].omega
-        ahead, behind = ([holder_of(each, omega, self.sides, self.turning) for each in row] for row in zip(*self.drawing.ends, strict=True))
-        return list(zip(ahead, behind, strict=True))
+        omega = self.behind.sides[0].omega
+        return [tuple(self.behind.holders(each, omega) for each in both) for both in self.drawing.ends]
 
     def at(self, places: Places) -> tuple[Variation, ...]:
         """Return the variations at some of the frequencies."""
-        holder, omega = self.holder.at(places), self.sides[0].omega
+        omega = self.behind.sides[0].omega
         stiffer = None
         if self.stiffness_spread > 0.0:
             # with the mesh and the modes of all frequencies, as the tool-holder itself
-            assembly, highest = stiffened(self.drawing.assembly, self.stiffness_spread), float(omega[-1])
-            stiffer = holder_of(assembly, omega[places], self.sides, self.turning, highest)
+            stiffer = self.behind.holders(stiffened(self.drawing.assembly, self.stiffness_spread), omega[places], float(omega[-1]))
         found = []
-        for side, members in self._known:
-            here = holder.tip(side.nominal[places])
+        for k, side in self._known.items():
+            holder, w = self.holders[k].at(places), side.nominal[places]
+            here = holder.tip(w)
             machine = np.zeros((0, *here.shape), dtype=complex)
             if side.doubt is not None:
                 machine = np.concatenate([holder.changes(side, places), holder.tip(side.rivals[:, places]) - here])
-            machine, open_, moves = self._with_drawing(side, places, machine)
+            machine, open_, moves = self._with_drawing(k, places, machine)
             kinds = [_KINDS[name] for name in self.drawing.fields]
             if stiffer is not None:
-                open_ = np.concatenate([open_, (stiffer.tip(side.nominal[places]) - here)[None]])
+                open_ = np.concatenate([open_, (stiffer[k].tip(w) - here)[None]])
                 moves = np.pad(moves, ((0, 1), (0, 1)))
                 moves[-1, -1] = 1.0
                 kinds.append(Doubted.STIFFNESS)
@@ -319,18 +379,19 @@ class TipSpread:
             change = np.concatenate([machine, open_])
             if not len(change):
                 change, unknowns = np.zeros((1, *here.shape), dtype=complex), {}
-            # the tool-holder is the same one in both planes
-            found.append(Variation(members, change, len(open_), unknowns))
+            # the tool-holder is the same one for all parts
+            found.append(Variation(self.members[k], change, len(open_), unknowns))
         return tuple(found)
 
-    def _with_drawing(self, side: Side, places: Places, machine: ComplexArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    def _with_drawing(self, k: int, places: Places, machine: ComplexArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
         """The machine's directions with the toolings that move along with them, what the drawing leaves open beside the machine, and how
         far each of the drawing's unknowns moves along all of these."""
         count = len(self.drawing.ends)
         if not count:
             return machine, np.zeros((0, *machine.shape[1:]), dtype=complex), np.zeros((0, len(machine)))
+        side = self._known[k]
         w = side.nominal[places]
-        along = np.array([0.5 * (ahead.at(places).tip(w) - behind.at(places).tip(w)) for ahead, behind in self._ends])
+        along = np.array([0.5 * (ahead[k].at(places).tip(w) - behind[k].at(places).tip(w)) for ahead, behind in self._ends])
         shifts, root, known = np.zeros((len(machine), count)), np.eye(count), self.drawing.known
         if known.size and side.doubt is not None and side.doubt.left.size:
             first, deviation = slice(known.size), self.drawing.deviation
@@ -342,41 +403,31 @@ class TipSpread:
 
     def guides(self) -> ComplexArray:
         """Return the tips of the rivals, each entry a curve."""
-        known = [(side, members) for side, members in self._known if side.doubt is not None]
-        curves = [self.holder.tip(side.rivals).transpose(0, 2, 3, 1).reshape(-1, side.omega.size) for side, _ in known]
-        return np.concatenate([np.zeros((0, self.sides[0].omega.size), dtype=complex), *curves])
+        known = [(self.holders[k], side) for k, side in self._known.items() if side.doubt is not None]
+        curves = [holder.tip(side.rivals).transpose(0, 2, 3, 1).reshape(-1, side.omega.size) for holder, side in known]
+        return np.concatenate([np.zeros((0, self.behind.sides[0].omega.size), dtype=complex), *curves])
 
 
-def holder_of(
-    assembly: ToolAssembly, omega: FloatArray, sides: Sequence[Side], turning: float | None, highest: float | None = None
-) -> Holder:
-    """Return a tool-holder at some frequencies as the machine's parts need it, turning or not."""
-    return Holder(assembly, omega, highest) if turning is None else TurningHolder(assembly, omega, turning, sides[0].axes)
-
-
-def tip_over_sides(
-    sides: Sequence[Side], drawing: FittedDrawing, stiffness_spread: float, turning: float | None = None
-) -> UncertainReceptance:
+def tip_over(behind: Behind, drawing: FittedDrawing, stiffness_spread: float) -> UncertainReceptance:
     """Return the tip's receptance of a tooling on a machine, with its spread where something is not known.
 
     Parameters
     ----------
-    sides : sequence of Side
+    behind : Behind
         All parts of the machine, at the same frequencies.
     drawing : FittedDrawing
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
-    turning : float or None [rad/s]
-        Spindle speed of the tool-holder's gyroscopic moments, which couple the planes: the machine is one part then. None leaves them out.
     """
-    omega = sides[0].omega
-    holder = holder_of(drawing.assembly, omega, sides, turning)
-    axes = [c for side in sides for c in side.axes]
+    omega = behind.sides[0].omega
+    holders = behind.holders(drawing.assembly, omega)
+    moves = [side.moves(behind.slopes) for side in behind.sides]
+    axes = tuple(c for each in moves for c in each)
     values, members = np.zeros((omega.size, len(axes), len(axes)), dtype=complex), []
-    for side in sides:
-        own = tuple(axes.index(c) for c in side.axes)
-        values[:, own[0] : own[-1] + 1, own[0] : own[-1] + 1] = holder.tip(side.nominal)
-        members.append(own)
-    known = bool(drawing.ends) or any(side.part.doubt is not None for side in sides)
-    spread = TipSpread(tuple(sides), tuple(members), holder, drawing, stiffness_spread, turning) if known else None
-    return UncertainReceptance(omega, values, tuple(axes), tuple(axes), spread)
+    for side, holder, own in zip(behind.sides, holders, moves, strict=True):
+        first = axes.index(own[0])
+        values[:, first : first + len(own), first : first + len(own)] = holder.tip(side.nominal)
+        members.append(tuple(range(first, first + len(own))))
+    known = bool(drawing.ends) or any(side.part.doubt is not None for side in behind.sides)
+    spread = TipSpread(behind, tuple(members), holders, drawing, stiffness_spread) if known else None
+    return UncertainReceptance(omega, values, axes, axes, spread)

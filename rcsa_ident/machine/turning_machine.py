@@ -10,6 +10,7 @@ import numpy as np
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machine.mode_synthesis import FLANGE
@@ -31,6 +32,8 @@ class TurningMachine(Machine):
     joint : LumpedJoint or None
         None where the modes hold the joint's compliance.
     name : str
+    axial : AxialFlange or None
+        What an axial tap showed.
     """
 
     modes: TurningModes
@@ -38,6 +41,7 @@ class TurningMachine(Machine):
     speeds: tuple[float, float]
     joint: LumpedJoint | None = None
     name: str = "turning spindle"
+    axial: AxialFlange | None = None
 
     def __post_init__(self) -> None:
         if self.modes.coordinates != FLANGE:

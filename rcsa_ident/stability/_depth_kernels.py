@@ -44,8 +44,92 @@ def _cubic(matrix, values):
 
 
 @numba.njit(cache=True)
+def _coefficients(matrix, polynomial, power, product):
+    """Write the characteristic polynomial of a matrix, highest power first, by Faddeev and LeVerrier.
+
+    Each coefficient is a sum of principal minors, so that directions may have units of their own.
+    """
+    r = matrix.shape[0]
+    polynomial[0] = 1.0
+    for a in range(r):
+        for b in range(r):
+            power[a, b] = matrix[a, b]
+    for k in range(1, r + 1):
+        trace = 0.0j
+        for a in range(r):
+            trace += power[a, a]
+        polynomial[k] = -trace / k
+        if k == r:
+            return
+        for a in range(r):
+            power[a, a] += polynomial[k]
+        for a in range(r):
+            for b in range(r):
+                value = 0.0j
+                for c in range(r):
+                    value += matrix[a, c] * power[c, b]
+                product[a, b] = value
+        for a in range(r):
+            for b in range(r):
+                power[a, b] = product[a, b]
+
+
+@numba.njit(cache=True)
+def _roots(polynomial, values):
+    """Write the roots of a polynomial, all at once [ehrlich1967], from those that stand there; return whether they were found."""
+    r = values.size
+    for _ in range(_STEPS):
+        largest, moved = 0.0, 0.0
+        for i in range(r):
+            x, value, slope = values[i], polynomial[0], 0.0j
+            for k in range(1, r + 1):
+                slope = slope * x + value
+                value = value * x + polynomial[k]
+            apart = 0.0j
+            for j in range(r):
+                if j != i:
+                    distance = x - values[j]
+                    if distance == 0.0:
+                        return False
+                    apart += 1.0 / distance
+            divisor = slope - value * apart
+            if divisor == 0.0:
+                return False
+            step = value / divisor
+            values[i] = x - step
+            largest, moved = max(largest, abs(values[i])), max(moved, abs(step))
+        if not moved < np.inf:
+            return False
+        if moved <= 1e-13 * largest:
+            return True
+    return False
+
+
+@numba.njit(cache=True)
+def _many(matrix, values):
+    """Write the eigenvalues of a matrix with more than three rows, by its polynomial; where roots meet, by LAPACK."""
+    r = matrix.shape[0]
+    polynomial, power, product = np.empty(r + 1, dtype=np.complex128), np.empty_like(matrix), np.empty_like(matrix)
+    _coefficients(matrix, polynomial, power, product)
+    if _roots(polynomial, values):
+        return
+    # on a circle that holds them all, and none of them on the real axis
+    radius = 0.0
+    for k in range(1, r + 1):
+        radius = max(radius, abs(polynomial[k]) ** (1.0 / k))
+    for k in range(r):
+        angle = 2.0 * math.pi * (k + 0.3) / r
+        values[k] = radius * complex(math.cos(angle), math.sin(angle))
+    if not _roots(polynomial, values):
+        values[:] = np.linalg.eigvals(matrix)
+
+
+@numba.njit(cache=True)
 def eigenvalues(matrix, values):
-    """Write the eigenvalues of a matrix, shape (r, r), in falling order of their real parts."""
+    """Write the eigenvalues of a matrix, shape (r, r), in falling order of their real parts.
+
+    Of more than three rows those that stand in `values` are where the search begins.
+    """
     r = matrix.shape[0]
     if r == 2:
         half = 0.5 * (matrix[0, 0] + matrix[1, 1])
@@ -54,9 +138,7 @@ def eigenvalues(matrix, values):
     elif r == 3:
         _cubic(matrix, values)
     else:
-        found = np.linalg.eigvals(matrix)
-        for k in range(r):
-            values[k] = found[k]
+        _many(matrix, values)
     for k in range(1, r):
         value, place = values[k], k
         while place > 0 and values[place - 1].real < value.real:
@@ -93,7 +175,7 @@ def boundaries(tips, depths, stiffness):
     n, r, count = tips.shape[0], tips.shape[1], depths.size
     depth, phase = np.full((n, r, _ROOTS), np.nan), np.full((n, r, _ROOTS), np.nan)
     matrix, between = np.empty((r, r), dtype=np.complex128), np.empty((r, r))
-    below, above, tried = np.empty(r, dtype=np.complex128), np.empty(r, dtype=np.complex128), np.empty(r, dtype=np.complex128)
+    below, above, tried = np.zeros(r, dtype=np.complex128), np.zeros(r, dtype=np.complex128), np.zeros(r, dtype=np.complex128)
     found = np.empty(r, dtype=np.int64)
     for i in range(n):
         for k in range(r):
@@ -115,6 +197,8 @@ def boundaries(tips, depths, stiffness):
                                 before = stiffness[d - 1, a, b] if d > 0 else 0.0
                                 between[a, b] = before + share * (stiffness[d, a, b] - before)
                         _product(between, tips[i], matrix)
+                        for a in range(r):
+                            tried[a] = above[a]
                         eigenvalues(matrix, tried)
                         value = tried[k]
                         at = 2.0 * value.real - 1.0
@@ -185,7 +269,7 @@ def first_of_ladder(omega, tips, depths, stiffness, delays, spreads):
         Of each tooth the mean delay up to each depth [s], and its change from the tip to there.
     """
     n, r = tips.shape[0], tips.shape[1]
-    matrix, values, before = np.empty((r, r), dtype=np.complex128), np.empty(r, dtype=np.complex128), np.empty(r, dtype=np.complex128)
+    matrix, values, before = np.empty((r, r), dtype=np.complex128), np.zeros(r, dtype=np.complex128), np.empty(r, dtype=np.complex128)
     last, last_place = 0.0, 0.0
     for d in range(depths.size):
         best, place = 0.0, 0.0

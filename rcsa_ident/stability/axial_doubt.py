@@ -24,7 +24,7 @@ def axial_doubt(tip: Receptance, process: MillingProcess, found: StabilityLobes)
     Parameters
     ----------
     tip : Receptance
-        In X and Y.
+        In X and Y, with slopes or without; Z rigid.
     process : MillingProcess
     found : StabilityLobes
         Its limits.
@@ -45,11 +45,13 @@ def axial_doubt(tip: Receptance, process: MillingProcess, found: StabilityLobes)
     few = np.linspace(0, limits.size - 1, min(limits.size, _SPEEDS)).astype(int)
     speeds, max_depth = found.spindle_speed[np.union1d(few, np.argmin(limits))], found.max_depth
     omega, planar = finer(tip)
-    rigid = march(omega, planar, process, ladder(process, 2, max_depth), speeds).limit
-    steps, ratios = ladder(process, 3, max_depth), []
+    known = planar.shape[1]
+    rigid = march(omega, planar, process, ladder(process, known, max_depth), speeds).limit
+    all_of_it = max(known, 3)
+    steps, ratios = ladder(process, all_of_it, max_depth), []
     for place in PLACES:
-        values = np.zeros((omega.size, 3, 3), dtype=complex)
-        values[:, :2, :2] = planar
+        values = np.zeros((omega.size, all_of_it, all_of_it), dtype=complex)
+        values[:, :known, :known] = planar
         x = omega / (place * chatter)
         values[:, 2, 2] = 1.0 / (STIFFNESS * (1.0 - x**2 + 2j * DAMPING * x))
         soft = march(omega, values, process, steps, speeds).limit

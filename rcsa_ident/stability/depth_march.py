@@ -17,8 +17,8 @@ from rcsa_ident.stability.regeneration import directions_of, regeneration
 
 #: Ratio of the depths at which the mean stiffness is asked, and how far below the largest they begin.
 _RATIO, _LEAST = 1.08, 1e-3
-#: Frequencies between two of the receptance's, at which it is interpolated.
-_BETWEEN = 3
+#: Change of a direct receptance, as a share, from one frequency to the next; and into how many at most those of the receptance are cut.
+_CHANGE, _MOST = 0.02, 4
 
 
 class Marched(NamedTuple):
@@ -70,12 +70,17 @@ def ladder(process: MillingProcess, directions: int, max_depth: float) -> DepthL
 
 
 def finer(tip: Receptance) -> tuple[FloatArray, ComplexArray]:
-    """Return frequencies above 0, more of them than the receptance has, and the receptance there, shape (n, r, r)."""
+    """Return frequencies above 0, more than the receptance has where it changes quickly, and the receptance there, shape (n, r, r)."""
     kept = tip.omega > 0.0
     omega, values = np.ascontiguousarray(tip.omega[kept]), tip.values[kept]
     r = values.shape[1]
-    shares = np.arange(_BETWEEN + 1) / (_BETWEEN + 1)
-    fine = np.append((omega[:-1, None] + shares * np.diff(omega)[:, None]).ravel(), omega[-1])
+    own = np.einsum("nii->ni", values)
+    size = np.maximum(np.maximum(np.abs(own[1:]), np.abs(own[:-1])), 1e-300)
+    pieces = np.clip(np.ceil(np.max(np.abs(np.diff(own, axis=0)) / size, axis=1) / _CHANGE), 1, _MOST).astype(int)
+    # each line, and behind it so many as its neighbour is far
+    first = np.repeat(np.arange(pieces.size), pieces)
+    share = (np.arange(first.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[first]
+    fine = np.append(omega[first] + share * np.diff(omega)[first], omega[-1])
     found = receptance_at(omega, np.ascontiguousarray(values.reshape(-1, r * r)), fine)
     return fine, np.ascontiguousarray(found.reshape(-1, r, r))
 
@@ -89,7 +94,9 @@ def march(omega: FloatArray, tips: ComplexArray, process: MillingProcess, steps:
     ones each speed asks the ladder's depths one after the other.
     """
     teeth = process.cutter.teeth
-    stiffness = np.ascontiguousarray(steps.stiffness)
+    # a direction that is rigid has no part in the loop: its eigenvalues are those of the others, and a zero
+    moves = np.flatnonzero(np.any(tips, axis=(0, 2)) | np.any(tips, axis=(0, 1)))
+    tips, stiffness = (np.ascontiguousarray(each[:, moves[:, None], moves]) for each in (tips, steps.stiffness))
     if process.cutter.equally_spaced:
         depth, phase = kernels.boundaries(tips, steps.depth, stiffness)
         limit, chatter, lobe = kernels.lowest(omega, depth, phase, 2.0 * np.pi / (teeth * speeds))

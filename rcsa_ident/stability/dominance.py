@@ -11,7 +11,8 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.uncertain import Doubted, UncertainReceptance
 from rcsa_ident.shown import Shown
-from rcsa_ident.stability.lobes import DEEPER, embedded
+from rcsa_ident.stability.lobes import DEEPER, embedded, known_directions
+from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 #: Standard deviation of the logarithm of a limit from which on its band matters: a depth that holds with 95 % is then 8 % lower, about
@@ -91,11 +92,12 @@ def band_shares(tip: UncertainReceptance, process: MillingProcess, speed: float,
     if not tip.complete:
         return None
     nodes, known = tip.thinned(), process.coefficients
+    wanted = TIP if process.is_plain else known_directions(nodes)
     deepest, method = DEEPER * max_depth, ZeroOrder()
     speeds = np.linspace((1.0 - tolerance) * speed, (1.0 + tolerance) * speed, _SPEEDS if tolerance > 0.0 else 1)
 
     def limits(values: np.ndarray, at: FloatArray, factors: FloatArray | None = None) -> FloatArray:
-        return method.depths(nodes.omega, embedded(values, nodes), process, at, deepest, factors)
+        return method.depths(nodes.omega, embedded(values, nodes, wanted), process, at, deepest, factors)
 
     at = speeds[[int(np.argmin(limits(nodes.values[None], speeds)[0]))]]
     change, unknowns = nodes.spread, nodes.unknowns()

@@ -91,7 +91,7 @@ def _limits(
 ) -> StabilityLobes:
     """What `stability_lobes` returns, of the cylinder."""
     plain = process.is_plain
-    both = (tip.planar if plain else tip) if isinstance(tip, TipModes) else (both_directions if plain else all_directions)(tip)
+    both = (tip.planar if plain else tip) if isinstance(tip, TipModes) else directions_for(process, tip)
     if isinstance(both, TipModes) or method.needs == "receptance":
         found = method.lobes(both, process, speeds, max_depth)
     else:
@@ -117,7 +117,8 @@ def _limits(
 def _axial(tip: Receptance | TipModes, process: MillingProcess, found: StabilityLobes) -> str:
     """What a soft axis would change, where the tip knows X and Y alone."""
     receptance = receptance_of(tip)
-    return axial_doubt(receptance, process, found) if len(receptance.rows) == 2 and _pushes_along(process, found) else ""
+    rigid = len(receptance.rows) == 2 or not np.any(receptance.values[:, 2, 2])
+    return axial_doubt(receptance, process, found) if rigid and _pushes_along(process, found) else ""
 
 
 def _pushes_along(process: MillingProcess, found: StabilityLobes) -> bool:
@@ -144,6 +145,16 @@ def drawn_limits(
         weights = np.random.default_rng([seed, 1]).standard_normal((draws, 2))
         factors = np.exp(weights * (known.tangential_spread, known.ratio_spread))
     return _ZERO_ORDER.depths(nodes.omega, tips, process, speeds, max_depth, factors)
+
+
+def asked_directions(process: MillingProcess) -> tuple[Coordinate, ...]:
+    """Return the directions of the tip that a cut asks for: X and Y along a wall, else Z and the slopes, too."""
+    return TIP if process.is_plain else DIRECTIONS
+
+
+def directions_for(process: MillingProcess, tip: Receptance) -> Receptance:
+    """Return the tip's receptance in the directions that a cut asks for, as far as it knows them."""
+    return both_directions(tip) if process.is_plain else all_directions(tip)
 
 
 def both_directions(tip: Receptance) -> Receptance:

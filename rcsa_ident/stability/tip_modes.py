@@ -174,8 +174,27 @@ def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
     known = known_modes(tip)
     if known is not None:
         return known
-    found, error = fitted_poles(tip.omega, tip.values, FIT_TOLERANCE, DAMPED_OUTSIDE)
-    return TipModes.joined([found]), error
+    size = slope_length(tip.values)
+    found, error = fitted_poles(tip.omega, tip.values * np.outer(size, size), FIT_TOLERANCE, DAMPED_OUTSIDE)
+    return TipModes.joined([found.projected(np.diag(1.0 / size), np.diag(1.0 / size))]), error
+
+
+def slope_length(values: ComplexArray) -> FloatArray:
+    """Return a factor for each direction that makes slopes as large as translations: what a fit of them all is to weigh alike.
+
+    Parameters
+    ----------
+    values : complex array, shape (n, r, r)
+        In 2, 3 or 5 directions.
+    """
+    r = values.shape[1]
+    size = np.ones(r)
+    if r == len(DIRECTIONS):
+        own = np.linalg.norm(np.einsum("nii->ni", values), axis=0)
+        for axis, slope in ((0, 3), (1, 4)):
+            if own[axis] > 0.0 and own[slope] > 0.0:
+                size[slope] = np.sqrt(own[axis] / own[slope])
+    return size
 
 
 def known_modes(tip: Receptance) -> tuple[TipModes, float] | None:
@@ -184,8 +203,9 @@ def known_modes(tip: Receptance) -> tuple[TipModes, float] | None:
     if poles is None or not np.all(poles.pole.real < 0.0):
         return None
     above = tip.omega > 0.0
-    values = tip.values[above]
-    error = float(np.linalg.norm(poles.response(tip.omega[above]) - values) / np.linalg.norm(values))
+    size = slope_length(tip.values)
+    weight = np.outer(size, size)
+    error = float(np.linalg.norm(weight * (poles.response(tip.omega) - tip.values)[above]) / np.linalg.norm(weight * tip.values[above]))
     return (TipModes.joined([poles]), error) if error <= NEAR_ENOUGH else None
 
 

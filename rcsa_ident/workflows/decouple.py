@@ -1,4 +1,4 @@
-"""A machine's flange from hammer tests with several known toolings."""
+"""A machine's flange from hammer tests: across the axis with several known toolings, along it with one."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.responses import in_plane
+from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.rods import axial_poles
 from rcsa_ident.workflows.compare import Place
 from rcsa_ident.workflows.contact import neighbour_noise
 
@@ -82,3 +85,24 @@ def flange_from_taps(
         std = np.hypot(neighbour_noise(tap.values), model_share * np.abs(tap.values))
         observations.append(Observation(holder, *_ENDS[tap.place], tap.values, std))
     return least_squares_flange(observations, joint, least_damping)
+
+
+def axial_flange_from_tap(tooling: Tooling, omega: FloatArray, values: ComplexArray, model_share: float = MODEL_SHARE) -> AxialFlange:
+    """Return what stands behind the flange along the axis, from one hammer test along it: W = A21 (A11 - C11)^-1 A12 - A22.
+
+    Parameters
+    ----------
+    tooling : Tooling
+        That was clamped; as rods it is as its drawing says.
+    omega : array, shape (n,) [rad/s]
+        Rising, above 0.
+    values : complex array, shape (n,) [m/N]
+        At the tip, along the axis.
+    model_share : float [-]
+        As in `flange_from_taps`.
+    """
+    free = axial_poles(tooling.assembly, float(omega[-1])).receptance(omega).values
+    between = free[:, 0, 1] * free[:, 1, 0]
+    left = free[:, 0, 0] - values
+    std = np.hypot(neighbour_noise(values), model_share * np.abs(values))
+    return AxialFlange.fitted(omega, between / left - free[:, 1, 1], std * np.abs(between / left**2), tooling.name)

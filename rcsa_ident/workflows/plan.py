@@ -28,7 +28,7 @@ from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, CutMeasurement
-from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.lobes import asked_directions, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.units import from_rpm, to_rpm
@@ -357,7 +357,7 @@ def limits_at(
     feed = allowed.feed_of(tooling.cutter, max(allowed.depths))
     process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, feed_angle, feed_per_tooth=feed)
     limits, deepest = np.empty(speeds.size), 2.0 * allowed.margin * max(allowed.depths)
-    for places, tip in tips_over_speed(machine, tooling, omega, speeds, spread=False):
+    for places, tip in tips_over_speed(machine, tooling, omega, speeds, spread=False, directions=asked_directions(process)):
         limits[places] = stability_lobes(tip, process, speeds[places], deepest, allowed.method).limit_depth
     return limits
 

@@ -21,20 +21,20 @@ from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
-from rcsa_ident.machine.speed_dependence import tips_over_speed
+from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.label_noise import LabelNoise
-from rcsa_ident.stability.lobes import DEEPER, DRAWS, both_directions, in_proportion, stability_lobes
+from rcsa_ident.stability.lobes import DEEPER, DRAWS, asked_directions, both_directions, directions_for, in_proportion, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
-from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes, known_modes
+from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.proportions import edge_length
@@ -101,7 +101,7 @@ def tooltip(
         Relative to the workpiece, as limits are computed from; by default the tool's own.
     """
     here = machine.at(speed)
-    tip = (here.relative_tip if relative else here.tip)(tooling, omega, spread, stiffness_spread)
+    tip = (here.relative_tip if relative else here.tip)(tooling, omega, spread, stiffness_spread, here.translations)
     if isinstance(tip, TipModes):
         lines = tip.receptance().omega if omega is None else omega
         tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
@@ -178,6 +178,11 @@ class ToolChange:
         """About how long a method takes for the limit at each speed [s]."""
         return method.seconds_per_operation * method.operations(self.process, speeds, float(self._lines_of(method)[-1]), self.max_depth)
 
+    def tips(self, speeds: FloatArray, omega: FloatArray | None = None, spread: bool = False) -> Tips:
+        """Yield the tip for each block of speeds that share one, in the directions that count for the cut; see `tips_over_speed`."""
+        lines = self.machine.lines(BEYOND) if omega is None else omega
+        return tips_over_speed(self.machine, self.tooling, lines, speeds, spread, self.stiffness_spread, asked_directions(self.process))
+
     def watched(self, watch: Watch) -> ToolChange:
         """Return the same question, whose method tells each speed's limit once it is known, where it asks speed by speed."""
         return replace(self, method=replace(self.method, watch=watch)) if isinstance(self.method, Watched) else self  # type: ignore[type-var]
@@ -189,7 +194,7 @@ class ToolChange:
         process, parts, order = self.process, [], []
         if isinstance(self.machine, LearntTip):
             return self.machine.limits(process, speeds, depth, draws)
-        for places, tip in tips_over_speed(self.machine, self.tooling, self.omega, speeds, draws > 0, self.stiffness_spread):
+        for places, tip in self.tips(speeds, self.omega, draws > 0):
             order.append(places)
             parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
         return StabilityLobes.joined(parts, order)
@@ -197,9 +202,9 @@ class ToolChange:
     def fitting_limits(self, speeds: FloatArray) -> StabilityLobes:
         """Return the limits at rising speeds by the method that fits any cut; drawn machines are in their zero-order proportion."""
         parts, order = [], []
-        for places, tip in tips_over_speed(self.machine, self.tooling, self.machine.lines(BEYOND), speeds, spread=False):
+        for places, tip in self.tips(speeds):
             order.append(places)
-            parts.append(_FITTING.lobes(_modes_of(tip), self.process, speeds[places], self.max_depth))
+            parts.append(_FITTING.lobes(_modes_of(tip, self.process), self.process, speeds[places], self.max_depth))
         found = StabilityLobes.joined(parts, order)
         preview = self.limits(speeds, DEEPER * self.max_depth)
         if preview.drawn is None:
@@ -287,8 +292,7 @@ def advise(
 
 def _band_of(change: ToolChange, speed: float, tolerance: float) -> BandShares | None:
     """What the band of the limit at a recommended speed consists of."""
-    tips = tips_over_speed(change.machine, change.tooling, change.omega, np.array([speed]), True, change.stiffness_spread)
-    ((_, tip),) = tips
+    ((_, tip),) = change.tips(np.array([speed]), change.omega, spread=True)
     return band_shares(tip, change.process, speed, change.max_depth, tolerance) if isinstance(tip, UncertainReceptance) else None
 
 
@@ -347,13 +351,11 @@ def _apart(found: Sequence[Place], count: int = 3) -> list[Place]:
     return kept[:count]
 
 
-def _modes_of(tip: Receptance | TipModes) -> TipModes:
+def _modes_of(tip: Receptance | TipModes, process: MillingProcess) -> TipModes:
     """A tip's modes, fitted where they are not known."""
     if isinstance(tip, TipModes):
         return tip
-    both = both_directions(tip)
-    known = known_modes(both)
-    return (fitted_modes(both) if known is None else known)[0]
+    return fitted_modes(directions_for(process, tip))[0]
 
 
 def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
@@ -408,8 +410,8 @@ def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> Stabili
     method = change.method if isinstance(change.method, MonodromyMethod) else FullDiscretisation()
     speeds, depth = np.unique(change.speeds), change.max_depth * np.arange(1, depths + 1) / depths
     parts = []
-    for places, tip in tips_over_speed(change.machine, change.tooling, change.machine.lines(BEYOND), speeds, spread=False):
-        parts.append(stability_map(_modes_of(tip), change.process, speeds[places], depth, method, full))
+    for places, tip in change.tips(speeds):
+        parts.append(stability_map(_modes_of(tip, change.process), change.process, speeds[places], depth, method, full))
     return StabilityMap.joined(parts)
 
 
@@ -417,7 +419,7 @@ def surface_of(change: ToolChange, depth: float) -> SurfaceError:
     """Return the surface location error at a depth [m], each speed with the machine as it is there."""
     speeds = np.unique(change.speeds)
     error, parts = np.zeros((speeds.size, 0)), list[SurfaceError]()
-    for places, tip in tips_over_speed(change.machine, change.tooling, change.machine.lines(BEYOND), speeds, spread=False):
+    for places, tip in change.tips(speeds):
         part = surface_location_error(tip if isinstance(tip, TipModes) else both_directions(tip), change.process, speeds[places], depth)
         error = np.zeros((speeds.size, part.height.size)) if not parts else error
         error[places] = part.error

@@ -33,15 +33,20 @@ def test_eigenvalues(size, seed):
     if seed == 3:
         # one direction that does not move
         matrix[:, -1] = 0.0
-    values = np.empty(size, dtype=complex)
-    kernels.eigenvalues(matrix, values)
+    values = np.zeros(size, dtype=complex)
     expected = np.linalg.eigvals(matrix)
-    np.testing.assert_allclose(values, expected[np.argsort(-expected.real)], atol=1e-12)
+    # from nowhere, and from those of a matrix beside it
+    for change in (0.0, 1e-3, 0.0):
+        kernels.eigenvalues(matrix * (1.0 + change), values)
+        np.testing.assert_allclose(values, (1.0 + change) * expected[np.argsort(-expected.real)], atol=1e-12)
 
 
-@pytest.mark.parametrize("matrix", [np.zeros((3, 3), dtype=complex), np.diag([2.0 + 1.0j] * 3), np.diag([1.0, 1.0, 3.0j])])
+@pytest.mark.parametrize(
+    "matrix",
+    [np.diag(each) for each in ([0j] * 3, [2.0 + 1j] * 3, [1.0, 1.0, 3j], [0j] * 5, [2.0 + 1j] * 4, [1.0, 1.0, 3j, 0.0, 0.0])],
+)
 def test_eigenvalues_that_coincide(matrix):
-    values = np.empty(3, dtype=complex)
+    values = np.zeros(len(matrix), dtype=complex)
     kernels.eigenvalues(matrix, values)
     expected = np.diag(matrix)
     np.testing.assert_allclose(values, expected[np.argsort(-expected.real)], atol=1e-12)

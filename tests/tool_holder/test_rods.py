@@ -9,30 +9,12 @@ import pytest
 
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.rods import axial_poles, rod_structure
+from tests.tool_holder.exact_rods import exact
 
 OMEGA = 2.0 * np.pi * np.linspace(50.0, 12e3, 400)
 CARBIDE, STEEL = MATERIALS["carbide"], MATERIALS["steel"]
 TOOL = (BeamSegment(0.03, 0.0096, CARBIDE), BeamSegment(0.07, 0.012, CARBIDE))
 HOLDER = (BeamSegment(0.05, 0.04, STEEL, inner_diameter=0.012), BeamSegment(0.04, 0.063, STEEL))
-
-
-def exact(rods, omega):
-    """Receptances between both ends of rods in a row: state (displacement, force) carried over each of them in closed form."""
-    carried = np.broadcast_to(np.eye(2, dtype=complex), (omega.size, 2, 2))
-    for rod in rods:
-        modulus = rod.material.youngs_modulus * (1.0 + 1j * rod.material.loss_factor)
-        area = np.pi / 4.0 * (rod.diameter**2 - rod.inner_diameter**2)
-        k = omega * np.sqrt(rod.material.density / modulus)
-        across = np.array(
-            [
-                [np.cos(k * rod.length), np.sin(k * rod.length) / (modulus * area * k)],
-                [-modulus * area * k * np.sin(k * rod.length), np.cos(k * rod.length)],
-            ]
-        ).transpose(2, 0, 1)
-        carried = across @ carried
-    # pushed at the tip with 1 N the rod's inner force there is -1 N, at the other end it is what pushes
-    (a, b), (c, d) = carried[:, 0].T, carried[:, 1].T
-    return np.array([[d / c, 1.0 / c], [1.0 / c, a / c]]).transpose(2, 0, 1), (a, b)
 
 
 def off(found, truth):
@@ -44,7 +26,7 @@ def test_a_stepped_rod():
     """Tool and holder end to end, with the materials' loss."""
     body = ToolAssembly(TOOL, HOLDER, insertion=0.0)
     found = axial_poles(body, float(OMEGA[-1])).receptance(OMEGA).values
-    truth, _ = exact((*TOOL, *HOLDER), OMEGA)
+    truth = exact((*TOOL, *HOLDER), OMEGA)
     assert off(found, truth) < 1e-4
     low = OMEGA < 3e4
     assert off(found[low], truth[low]) < 1e-5

@@ -1,0 +1,103 @@
+"""What gives way behind the flange along the spindle's axis: one axial tap of any tooling tells it for all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.poles import PoleResidue, frequencies
+from rcsa_ident.dynamics.rational import fitted_poles
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_hz
+
+#: The only direction of it.
+AXIAL = (Coordinate("flange", Dof.Z),)
+#: What a fit may be beside receptances without noise, and the damping ratio of poles outside the band, at least.
+_TOLERANCE, _DAMPED_OUTSIDE = 1e-3, 0.1
+#: Share of the frequencies at which it may feed energy in before that is said, and how much of its magnitude that is.
+_MOST_ACTIVE, _ACTIVE = 0.05, 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AxialFlange(Shown):
+    """The receptance of machine and spindle at the flange along the axis, with the joint's compliance in it, as poles.
+
+    Parameters
+    ----------
+    modes : PoleResidue
+        Of one input and one output [m/N].
+    band : (float, float) [rad/s]
+        Lowest and highest frequency at which it was measured; beyond it the poles answer.
+    tooling : str
+        That was tapped; empty where nobody knows.
+    """
+
+    modes: PoleResidue
+    band: tuple[float, float]
+    tooling: str = ""
+
+    def __post_init__(self) -> None:
+        if self.modes.constant.shape != (1, 1):
+            raise InputError("axial flange", self.modes.constant.shape, "poles of one direction")
+        if not np.all(self.modes.pole.real < 0.0):
+            raise InputError("axial flange", self.modes.pole.tolist(), "damped poles: negative real parts [rad/s]")
+
+    @classmethod
+    def fitted(cls, omega: FloatArray, values: ComplexArray, noise: FloatArray | None = None, tooling: str = "") -> Self:
+        """Return the poles of a measured or decoupled receptance.
+
+        Parameters
+        ----------
+        omega : array, shape (n,) [rad/s]
+            Rising, above 0.
+        values : complex array, shape (n,) [m/N]
+        noise : array, shape (n,), optional
+            Standard deviation of the real and of the imaginary part each.
+        tooling : str
+            That was tapped.
+        """
+        if omega.size < 8 or not np.all(np.diff(omega) > 0.0) or omega[0] <= 0.0:
+            raise InputError("axial frequencies", f"{omega.size} of them", "at least 8 that rise, above 0 [rad/s]")
+        if not np.all(np.isfinite(values)):
+            raise InputError("axial receptance", "not finite", "finite numbers")
+        spread = None if noise is None else noise[:, None, None]
+        poles, _ = fitted_poles(omega, values[:, None, None], _TOLERANCE, _DAMPED_OUTSIDE, spread)
+        return cls(poles, (float(omega[0]), float(omega[-1])), tooling)
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """``flange.z``."""
+        return AXIAL
+
+    @property
+    def part(self) -> FlangePart:
+        """The same as a part of a machine, which feels nothing of the others."""
+        return FlangePart(AXIAL, JointedFlange(self, None))
+
+    def receptance(self, omega: FloatArray) -> Receptance:
+        """Return the receptance over ``flange.z``, shape (n, 1, 1)."""
+        return Receptance(omega, self.modes.response(omega), AXIAL, AXIAL)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What speaks against it: a flange that feeds energy in."""
+        values = self.modes.response(np.linspace(*self.band, 500))[:, 0, 0]
+        share = float(np.mean(values.imag > _ACTIVE * np.abs(values)))
+        if share <= _MOST_ACTIVE:
+            return ()
+        return (
+            f"along the axis the flange would feed energy in at {100.0 * share:.0f} % of the frequencies: the tap's calibration or sign, "
+            "or the drawing of the tooling that was tapped, is wrong",
+        )
+
+    def __str__(self) -> str:
+        low, high = (to_hz(w) for w in self.band)
+        tapped = f", tapped with {self.tooling}" if self.tooling else ""
+        return f"{frequencies('poles along the axis', np.abs(self.modes.pole))}, {low:.0f} to {high:.0f} Hz{tapped}"
