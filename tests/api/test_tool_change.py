@@ -204,6 +204,24 @@ def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
     assert any("extrapolated" in w for w in client.tooltip(id, "T1", to_hz=5000).warnings)
 
 
+def test_a_machine_that_was_tapped_along_its_axis_knows_z(client, result):
+    """A result with what `rcsa-ident axial` wrote into it, as it is uploaded."""
+    along = {"pole_per_s": [-250.0, 5650.0], "residue_m_per_n_s": [0.0, -1e-4]}
+    axial = {"tooling": "T1", "band_hz": [100.0, 4000.0], "poles": [along], "constant_m_per_n": 5e-10}
+    id = client.make_machine("m").id
+    client.identify(id, json.dumps(json.loads(result) | {"axial": axial}))
+    client.write_tooling("T1", by_hand.TOOLING)
+    found = client.tooltip(id, "T1", step_hz=10)
+    machine = machine_from_json(json.loads(result) | {"axial": axial}, "")
+    tip = machine.tip(by_hand.tooling(), 2.0 * np.pi * np.array(found.frequency_hz), directions=machine.translations, spread=False)
+    assert list(found.axes) == ["X", "Y", "Z"]
+    np.testing.assert_allclose(np.array(found.axes["Z"].re) + 1j * np.array(found.axes["Z"].im), tip.between("tip.z", "tip.z"), rtol=1e-8)
+    many = json.dumps(json.loads(result) | {"axial": axial | {"poles": [along] * 1000}})
+    assert refused(422, client.identify, id, many).errors[0].field == "axial.poles"
+    none = json.dumps(json.loads(result) | {"axial": axial | {"band_hz": [0.0, 1.0]}})
+    assert refused(422, client.identify, id, none).errors[0].field == "axial.band_hz"
+
+
 def test_a_speed_that_the_machine_was_not_cut_at(client, tmp_path):
     id = client.make_machine("m").id
     client.identify(id, by_hand.result_text(tmp_path, True))
