@@ -104,7 +104,7 @@ def force_at(step, here, velocity, past, pieces, plan, speed, normal, out):
                 whole = int(ago)
                 part = ago - whole
                 first = (step - whole) % size
-                second = (step - whole - 1) % size
+                second = first - 1 if first > 0 else size - 1
                 moved = out_now
                 for a in range(directions):
                     moved -= normal[a] * ((1.0 - part) * past[first, a] + part * past[second, a])
