@@ -21,6 +21,7 @@ CLAIMS = (
     "lobes",
     "stability",
     "cylinder_error",
+    "shape_cost",
     "observer",
     "real_files",
     "service",

@@ -43,7 +43,7 @@ def _named(*names: str) -> tuple[Case, ...]:
     return tuple(mills.LIMITS[name][:3] for name in names)
 
 
-_ROUGHERS = tuple((mills.rougher(1e-3 * feed), mills.tip(mills.M1[:2]), mills.ROUGHER_SPEEDS) for feed in mills.ROUGHER)
+ROUGHERS = tuple((mills.rougher(1e-3 * feed), mills.tip(mills.M1[:2]), mills.ROUGHER_SPEEDS) for feed in mills.ROUGHER)
 COMPARED = (
     Compared("45° face mill Ø63, sharp and with a corner radius", _named("A", "A, corner"), "0.93 to 0.98"),
     Compared("45° face mill Ø63, tip tilts by 7 rad per metre", _named("A, slope -7"), "0.72"),
@@ -59,7 +59,7 @@ COMPARED = (
     Compared("helix of each tooth", _named("E A"), "0.79 to 0.91"),
     Compared("helix of each tooth and unequal pitch, as mean helix", _named("E B"), "0.75 to 0.94"),
     Compared("helix of each tooth and unequal pitch, as equal teeth", _named("E B"), "0.43 to 0.99", equal=True),
-    Compared("rougher, three feeds", _ROUGHERS, "0.24 to 0.47"),
+    Compared("rougher, three feeds", ROUGHERS, "0.24 to 0.47"),
 )
 
 
@@ -70,7 +70,7 @@ def run() -> list[dict[str, Any]]:
 
 def limits(compared: Compared) -> tuple[FloatArray, FloatArray]:
     """Return the limits of the shapes and of their cylinders [m] at all speeds of the cases, one after the other."""
-    pairs = [[_limits(*case), _limits(*cylinder(case, compared.equal))] for case in compared.cases]
+    pairs = [[limits_of(*case), limits_of(*cylinder(case, compared.equal))] for case in compared.cases]
     true, flat = np.concatenate(pairs, axis=1)
     return true, flat
 
@@ -86,7 +86,8 @@ def cylinder(case: Case, equal: bool = False) -> Case:
     return plain, TipModes(tip.pole[kept], tip.outputs[:2, kept], tip.inputs[kept, :2], tip.constant[:2, :2]), rpm
 
 
-def _limits(process: MillingProcess, tip: TipModes, rpm: Sequence[float]) -> FloatArray:
+def limits_of(process: MillingProcess, tip: TipModes, rpm: Sequence[float]) -> FloatArray:
+    """Return the limits of a case at its speeds [m]."""
     return stability_lobes(tip, process, np.array(rpm) * mills.RPM, mills.deepest(process), METHOD).limit_depth
 
 
