@@ -15,7 +15,20 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Each is a module with ``run() -> list of rows``.
-CLAIMS = ("candidate", "forces", "lobes", "stability", "observer", "real_files", "service", "uploads", "published_modes", "bad_input")
+CLAIMS = (
+    "candidate",
+    "forces",
+    "lobes",
+    "stability",
+    "cylinder_error",
+    "shape_cost",
+    "observer",
+    "real_files",
+    "service",
+    "uploads",
+    "published_modes",
+    "bad_input",
+)
 #: Each is a module with ``main(arguments)``.
 STUDIES = (
     "study",

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.comparison import compared
-from benchmarks.machines import under
+from benchmarks.machines import named, under
 from benchmarks.study import machine_of, read_cut, truth_folder
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
@@ -133,9 +133,11 @@ def main(arguments: Sequence[str]) -> None:
         prog="benchmarks corner_radius", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--scratch", type=Path, help="folder of campaigns; default: a new temporary one")
-    parser.add_argument("--machines", nargs="*", default=["hpm"], help="seeds of drawn machines, or names in data/machines")
+    parser.add_argument(
+        "--machines", nargs="*", default=["hpm"], help="drawn for the ten of the study, seeds of drawn machines, or names in data/machines"
+    )
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of the search: one seed's errors scatter by a factor of 3")
     given = parser.parse_args(arguments)
     print(force_table(), flush=True)
     if given.machines:
-        run(given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-corner-")), given.machines, given.seeds)
+        run(given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-corner-")), named(given.machines), given.seeds)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import lru_cache
 
 import numpy as np
 
@@ -150,13 +151,13 @@ class Cutter(Shown):
     @property
     def offset(self) -> bool:
         """Whether teeth are offset from each other, so that one may cut what the one ahead of it left standing."""
-        plain = np.ptp(self.runout) == 0.0 and np.ptp(self.axial_runout) == 0.0 and self.tilt == 0.0
-        return not self.equally_spaced and (self.serration is not None or not plain)
+        plain = self.tilt == 0.0 and not _differ(self.runout) and not _differ(self.axial_runout)
+        return (self.serration is not None or not plain) and not self.equally_spaced
 
     @property
     def outline(self) -> Profile:
         """What the edges sweep over."""
-        return Profile.flat(self.diameter) if self.profile is None else self.profile
+        return _wall(self.diameter) if self.profile is None else self.profile
 
     @property
     def largest_lag(self) -> float:
@@ -173,7 +174,7 @@ class Cutter(Shown):
         """True where all teeth are alike, so that only multiples of the tooth-passing frequency are excited."""
         if self.tilt != 0.0 or isinstance(self.helix, np.ndarray) or self.pitch.max() - self.pitch.min() >= 1e-9:
             return False
-        if any(offset.max() > offset.min() for offset in (self.runout, self.axial_runout)):
+        if _differ(self.runout) or _differ(self.axial_runout):
             return False
         return self.serration is None or bool(np.ptp(np.mod(self.serration.shifts(self.teeth), 1.0)) == 0.0)
 
@@ -207,3 +208,14 @@ class Cutter(Shown):
         parts += [] if self.serration is None else [str(self.serration)]
         parts += [f"axial run-out {1e6 * np.ptp(self.axial_runout):.2g} µm"] if np.any(self.axial_runout) else []
         return ", ".join(parts)
+
+
+def _differ(offsets: FloatArray) -> bool:
+    """Whether teeth are offset from each other."""
+    return bool(offsets.any() and offsets.max() > offsets.min())
+
+
+@lru_cache(maxsize=64)
+def _wall(diameter: float) -> Profile:
+    """The outline of a plain cylinder: asked for at every limit, and checked once."""
+    return Profile.flat(diameter)

@@ -46,7 +46,7 @@ _OF_LIMITS = {
     CutterShape.BULL_NOSE: "0.95 to 1.17 times the true ones with a corner radius of 3 mm on Ø16 mm, and up to 1.72 times on a soft Z axis",
     CutterShape.BALL: "0.80 to 1.07 times the true ones in a slot, 0.81 to 0.89 times at a shoulder, and up to 1.30 times on a soft Z axis",
     CutterShape.FACE: (
-        "0.93 to 0.98 times the true ones at a cutting edge angle of 45°, and 0.72 times (Ø63 mm) or 0.38 times (Ø160 mm) where the "
+        "0.93 to 0.98 times the true ones at a cutting edge angle of 45°, and 0.72 times (Ø63 mm) or 0.39 times (Ø160 mm) where the "
         "tip tilts by 7 rad per metre of its motion"
     ),
     CutterShape.HIGH_FEED: (

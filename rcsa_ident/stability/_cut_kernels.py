@@ -30,6 +30,8 @@ class CutPlan(NamedTuple):
     #: Angles [rad].
     period: float
     spacing: float
+    #: Of the windows' lags and forces.
+    share: float
     speed: float
     #: Amplitude and ratio of a varying speed.
     swing: float
@@ -191,7 +193,7 @@ def coefficients(rows, forms, rubbing, plan, places, points, table):
     q, r, count = table.shape[1] - 1, forms.shape[2], plan.delays.size
     stiffness, damping = np.zeros((points, count, r, r)), np.zeros((points, r, r))
     angle, time = np.empty(points), np.empty(points)
-    basis = np.empty(5)
+    basis, rubs = np.empty(5), rubbing.shape[0] > 0
     for e in range(places.shape[0]):
         if places[e, 3] < 0:
             continue
@@ -210,12 +212,17 @@ def coefficients(rows, forms, rubbing, plan, places, points, table):
                 if not add_window(theta, middle if rows[w, 6] > 0.0 else theta, rows[w], plan.spacing, basis):
                     continue
                 d = int(rows[w, 5])
-                for k in range(5):
-                    for a in range(r):
-                        for b in range(r):
-                            stiffness[point, d, a, b] += basis[k] * forms[w, k, a, b]
-                            if rubbing.shape[0] > 0:
-                                damping[point, a, b] += basis[k] * rubbing[w, k, a, b] / speed
+                for a in range(r):
+                    for b in range(r):
+                        pushed = 0.0
+                        for k in range(5):
+                            pushed += basis[k] * forms[w, k, a, b]
+                        stiffness[point, d, a, b] += pushed
+                        if rubs:
+                            pushed = 0.0
+                            for k in range(5):
+                                pushed += basis[k] * rubbing[w, k, a, b]
+                            damping[point, a, b] += pushed / speed
     if plan.frozen:
         # each step with its means: a step's nodes are its own, so the shared ones are kept by the step that starts there
         for e in range(places.shape[0]):
@@ -334,6 +341,8 @@ def lay_out(rows, forms, rubbing, plan, table):
     -------
     CutLayout
     """
+    rows, forms, rubbing = rows.copy(), plan.share * forms, plan.share * rubbing
+    rows[:, 3:5] *= plan.share
     places, points = elements(rows, plan, table.shape[1] - 1)
     stiffness, damping, angle, time = coefficients(rows, forms, rubbing, plan, places, points, table)
     where, weight = lookups(plan, places, points, angle, time, table, stiffness)

@@ -65,21 +65,24 @@ def force_at(step, here, velocity, past, pieces, plan, speed, normal, out):
     past : array (n, r)
         Ring of tips at the steps before this one, which has the number `step`.
     pieces : array (s, 9 + 3 teeth)
-        Of each piece of a tooth's edge: angle ahead of tooth 1's tip, angles between which it cuts, width, sine and cosine of its normal's
-        angle, radius, height, radius by which it rubs, then for each tooth ahead: steps ago, feed since then, by how much less it stands
-        out.
+        Of each piece of a tooth's edge: angle ahead of tooth 1's tip, within a turn, angles between which it cuts, width, sine and cosine
+        of its normal's angle, radius, height, radius by which it rubs, then for each tooth ahead: steps ago, feed since then, by how much
+        less it stands out.
     speed : float
         Of the spindle, now.
     normal : array (r,)
         Room for the outward normal of a piece.
     out : array (r,)
     """
-    size, count, theta, directions = past.shape[0], (pieces.shape[1] - PIECE) // 3, plan.step * step, here.size
+    size, count, directions = past.shape[0], (pieces.shape[1] - PIECE) // 3, here.size
+    # half a step ahead, so that an edge whose step reaches over the angle 0 stands below it
+    theta = (plan.step * step + 0.5 * plan.step) % (2.0 * math.pi)
     for a in range(directions):
         out[a] = 0.0
     for i in range(pieces.shape[0]):
         piece = pieces[i]
-        phi = (theta + piece[0] + 0.5 * plan.step) % (2.0 * math.pi) - 0.5 * plan.step
+        phi = theta + piece[0]
+        phi -= 0.5 * plan.step if phi < 2.0 * math.pi else 0.5 * plan.step + 2.0 * math.pi
         # the share of the step about this place in which the edge is inside: without it the entry would jump by a step
         low, high = max(phi - 0.5 * plan.step, piece[1]), min(phi + 0.5 * plan.step, piece[2])
         inside = (high - low) / plan.step
@@ -104,7 +107,7 @@ def force_at(step, here, velocity, past, pieces, plan, speed, normal, out):
                 whole = int(ago)
                 part = ago - whole
                 first = (step - whole) % size
-                second = (step - whole - 1) % size
+                second = first - 1 if first > 0 else size - 1
                 moved = out_now
                 for a in range(directions):
                     moved -= normal[a] * ((1.0 - part) * past[first, a] + part * past[second, a])

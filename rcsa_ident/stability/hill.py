@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -105,17 +106,30 @@ class PeriodicTeeth:
         self.slope = 0.5 * self.base * process.cutter.largest_lag
         self._latest: tuple[int, float] | None = None
         self._harmonics: Harmonics | None = None
+        self._straight: dict[int, Harmonics] = {}
 
     def harmonics(self, count: int, depth: float) -> Harmonics:
         """Return the harmonics -count..count, tooth 1 at immersion 0 with its tip when t = 0."""
         if self._harmonics is None or self._latest != (count, depth):
-            self._latest, self._harmonics = (count, depth), self._computed(count, depth)
+            make = self._leaning if self.process.is_plain else partial(self._computed, self.process)
+            self._latest, self._harmonics = (count, depth), make(count, depth)
         return self._harmonics
 
-    def _computed(self, count: int, depth: float) -> Harmonics:
+    def _leaning(self, count: int, depth: float) -> Harmonics:
+        """The harmonics of a wall: all of its edges lag alike, so that those of straight ones are turned and spread."""
+        cutter = self.process.cutter
+        if count not in self._straight:
+            straight = replace(self.process, cutter=replace(cutter, helix=0.0))
+            self._straight[count] = self._computed(straight, count, cutter.diameter)
+        known = self._straight[count]
+        half = self.slope * depth * np.arange(-count, count + 1)
+        turn = (np.exp(-1j * half) * np.sinc(half / np.pi))[:, None, None]
+        return Harmonics(known.delay, turn * known.stiffness, None if known.rubbing is None else turn * known.rubbing)
+
+    def _computed(self, process: MillingProcess, count: int, depth: float) -> Harmonics:
         order = np.arange(-count, count + 1)
         kept = np.abs(order) <= (count if self.kept is None else self.kept)
-        known = regeneration(self.process, depth, self.directions)
+        known = regeneration(process, depth, self.directions)
         rows = known.rows
         delay, place = np.unique(np.round(rows.delay, 12), return_inverse=True)
         per_depth = (kept / depth)[:, None, None, None] / rows.width[:, None, None]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,6 +56,24 @@ class Multiplier:
     residual: float
 
 
+class Windows(NamedTuple):
+    """Which teeth stand where, as the kernels want it.
+
+    Parameters
+    ----------
+    rows : array, shape (w, 7)
+        See `_cut_kernels`.
+    forms, rubbing : arrays, shape (w, 5, r, r)
+        What each pushes and rubs with in the displacements that are kept; rubbing has none where nothing rubs.
+    delays : array, shape (d,) [rad]
+    """
+
+    rows: FloatArray
+    forms: FloatArray
+    rubbing: FloatArray
+    delays: FloatArray
+
+
 class MonodromyOperator:
     """A cut that waits for its speed and depth.
 
@@ -97,8 +116,11 @@ class MonodromyOperator:
         self.arrays = ModeArrays(
             modes.pole.copy(), np.ascontiguousarray(outputs / size), np.ascontiguousarray(inputs * size[:, None]), np.array(constant)
         )
-        #: Whether all forces are proportional to the depth.
-        self.proportional = cutter.largest_lag == 0.0 and process.is_plain and process.engagement_profile is None and modes.shape is None
+        #: Whether every depth is cut alike: forces and lags are proportional to it.
+        self.alike = process.is_plain and process.engagement_profile is None and modes.shape is None
+        #: Whether all forces are proportional to the depth, and nothing else changes with it.
+        self.proportional = self.alike and cutter.largest_lag == 0.0
+        self._windows_of_unit: Windows | None = None
         self._unit: dict[tuple[float, float], kernels.CutLayout] = {}
 
     def duration(self, speed: float) -> float:
@@ -158,15 +180,17 @@ class MonodromyOperator:
         return unit._replace(stiffness=share * unit.stiffness, damping=share * unit.damping)
 
     def _lay_out(self, speed: float, depth: float, step: float) -> kernels.CutLayout:
-        windows, forms, rubbing, delays = self._windows(speed, depth)
-        found: kernels.CutLayout = kernels.lay_out(windows, forms, rubbing, self._plan(speed, step, delays), self.table)
+        windows, share = self._shared(speed, depth)
+        plan = self._plan(speed, step, windows.delays, share)
+        found: kernels.CutLayout = kernels.lay_out(windows.rows, windows.forms, windows.rubbing, plan, self.table)
         return found
 
-    def _plan(self, speed: float, step: float, delays: FloatArray) -> kernels.CutPlan:
+    def _plan(self, speed: float, step: float, delays: FloatArray, share: float = 1.0) -> kernels.CutPlan:
         v = self.process.speed_variation
         return kernels.CutPlan(
             period=self.period,
             spacing=self.spacing,
+            share=share,
             speed=float(speed),
             swing=0.0 if v is None else float(v.amplitude),
             swings=0.0 if v is None else float(v.ratio),
@@ -175,8 +199,16 @@ class MonodromyOperator:
             delays=delays,
         )
 
-    def _windows(self, speed: float, depth: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Windows, what each pushes with and rubs with in the displacements that are kept, and the delays, as the kernels want them."""
+    def _shared(self, speed: float, depth: float) -> tuple[Windows, float]:
+        """Windows, and the share of their lags and forces that a depth has: where every depth is cut alike they are sought once."""
+        if not self.alike:
+            return self._windows(speed, depth), 1.0
+        unit = self.process.cutter.diameter
+        if self._windows_of_unit is None:
+            self._windows_of_unit = self._windows(speed, unit)
+        return self._windows_of_unit, depth / unit
+
+    def _windows(self, speed: float, depth: float) -> Windows:
         rows = self._rows(speed, depth)
         known = regeneration_of(self.process, rows, self.count)
         delays, place = np.unique(np.round(rows.delay, 12), return_inverse=True)
@@ -185,7 +217,7 @@ class MonodromyOperator:
         windows = np.stack([rows.angle, rows.start, rows.end, rows.near, rows.far, place, splits], axis=1)
         moved = self._directions(rows.z)
         forms = [_projected(moved, form) for form in (known.stiffness, known.rubbing) if form is not None]
-        return windows, forms[0], forms[1] if len(forms) > 1 else np.zeros((0, *forms[0].shape[1:])), delays
+        return Windows(windows, forms[0], forms[1] if len(forms) > 1 else np.zeros((0, *forms[0].shape[1:])), delays)
 
     def _rows(self, speed: float, depth: float) -> Rows:
         process = self.process

@@ -330,7 +330,7 @@ class _Cut:
                 ago = np.where(np.abs(ago - np.round(ago)) < 1e-9 * ago, np.round(ago), ago)
                 less = piece.edges.offset[j] - piece.edges.offset[(ahead + 1) % teeth]
                 since = np.stack([ago, self.feed * teeth * back / (2.0 * np.pi), less], axis=1).reshape(3 * teeth, -1)
-                angle = cutter.tooth_angle[j] - piece.edges.lag[j]
+                angle = np.mod(cutter.tooth_angle[j] - piece.edges.lag[j], 2.0 * np.pi)
                 slowest = np.maximum(piece.r, SLOWEST * self.radius)
                 for arc in piece.arcs:
                     place = arc[:, 0], arc[:, 1], width, np.sin(kappa), np.cos(kappa), piece.r, piece.z, slowest

@@ -14,7 +14,7 @@ from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.stability.mills import COEFFICIENTS, RPM, SKEWED, SLOT, MillingProcess, tip
 
 RANGES = {
-    "face": ["0.93 to 0.98", "0.72", "0.38"],
+    "face": ["0.93 to 0.98", "0.72", "0.39"],
     "high-feed": ["0.61 to 1.45", "0.77 to 1.85", "0.92 to 4.0"],
     "ball": ["0.80 to 1.07", "0.81 to 0.89", "1.30"],
     "bull-nose": ["0.95 to 1.17", "1.72"],

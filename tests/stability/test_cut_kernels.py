@@ -51,6 +51,17 @@ def edge_sum(theta, row, plan, form, slices=4000):
     return total / slices
 
 
+@pytest.mark.parametrize("process", CASES.values(), ids=CASES)
+def test_a_depth_that_is_laid_out_as_a_share_of_another(process):
+    """Windows of a cylinder are sought once: lags and forces of all depths are in proportion."""
+    cut = MonodromyOperator(tip(SKEWED), process, 4)
+    rows, forms, rubbing, delays = cut._windows(SPEED, DEPTH)
+    cut._lay_out(SPEED, 0.4 * DEPTH, 2e-4)
+    plain = kernels.lay_out(rows, forms, rubbing, cut._plan(SPEED, 2e-4, delays), cut.table)
+    for shared, each in zip(cut._lay_out(SPEED, DEPTH, 2e-4), plain, strict=True):
+        np.testing.assert_allclose(shared, each, rtol=1e-12, atol=1e-12 * np.abs(each).max(initial=0.0))
+
+
 def test_clock():
     plan = MonodromyOperator(tip(SKEWED), CASES["straight"], 4)._plan(700.0, 2e-4, np.zeros(0))._replace(swing=0.8, swings=0.4)
     for t in (0.0, 1e-3, 0.03, 0.4):
