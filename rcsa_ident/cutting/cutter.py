@@ -149,6 +149,23 @@ class Cutter(Shown):
         return self.teeth if self.running_true().equally_spaced else 1
 
     @property
+    def symmetry(self) -> int:
+        """How often its teeth come round alike in a turn, with all that makes them unlike: 2 of teeth whose pitch alternates."""
+        if self.equally_spaced:
+            return self.teeth
+        if self.tilt != 0.0:
+            return 1
+        shifts = np.zeros(self.teeth) if self.serration is None else np.mod(self.serration.shifts(self.teeth), 1.0)
+        teeth = np.stack(
+            [self.pitch, self.helices, self.runout, self.axial_runout, np.cos(2.0 * np.pi * shifts), np.sin(2.0 * np.pi * shifts)]
+        )
+        scale = np.array([1.0, 1.0, self.diameter, self.diameter, 1.0, 1.0])[:, None]
+        for count in range(self.teeth, 1, -1):
+            if self.teeth % count == 0 and np.all(np.abs(np.roll(teeth, self.teeth // count, axis=1) - teeth) < 1e-9 * scale):
+                return count
+        return 1
+
+    @property
     def offset(self) -> bool:
         """Whether teeth are offset from each other, so that one may cut what the one ahead of it left standing."""
         plain = self.tilt == 0.0 and not _differ(self.runout) and not _differ(self.axial_runout)

@@ -34,6 +34,8 @@ _CLOSE = 0.02
 _LOOKS = 6
 #: Steps of Newton's method for a crossing.
 _NEWTON = 15
+#: Delays whose phases differ by more stand apart [rad]; a polynomial of so many nodes, and more with the phase, is exact to 1e-10.
+_APART, _DEGREE = 1.0, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +103,7 @@ class PeriodicTeeth:
     def __init__(self, process: MillingProcess, harmonics: int | None, directions: Directions) -> None:
         self.process, self.kept, self.directions = process, harmonics, directions
         #: How often a turn repeats itself.
-        self.base = process.cutter.teeth if process.cutter.equally_spaced else 1
+        self.base = process.cutter.symmetry
         #: By which the first harmonic is turned per depth [rad/m].
         self.slope = 0.5 * self.base * process.cutter.largest_lag
         self._latest: tuple[int, float] | None = None
@@ -136,9 +138,41 @@ class PeriodicTeeth:
         members = (place == np.arange(delay.size)[:, None]).astype(float)
         lines = per_depth * lines_of_rows(rows, known.stiffness, self.base * order)
         stiffness = np.tensordot(members, lines, axes=(1, 1))
+        delay, stiffness = fewer_delays(delay, stiffness, self.base * (count + 1.0))
         if known.rubbing is None:
             return Harmonics(delay, stiffness, None)
         return Harmonics(delay, stiffness, np.sum(per_depth * lines_of_rows(rows, known.rubbing, self.base * order), axis=1))
+
+
+def fewer_delays(delay: FloatArray, stiffness: ComplexArray, highest: float) -> tuple[FloatArray, ComplexArray]:
+    """Return fewer delays that act as many do: between them e^{-i w tau} is a polynomial through Chebyshev's nodes.
+
+    Parameters
+    ----------
+    delay : array, shape (d,) [rad]
+        Ascending.
+    stiffness : complex array, shape (d, ...)
+        What acts with each.
+    highest : float [-]
+        Largest frequency over the spindle's.
+    """
+    delays, acting = [], []
+    for places in np.split(np.arange(delay.size), np.flatnonzero(highest * np.diff(delay) > _APART) + 1):
+        own, half = delay[places], 0.5 * float(delay[places[-1]] - delay[places[0]])
+        count = _DEGREE + int(np.ceil(1.5 * highest * half))
+        if count >= places.size:
+            delays.append(own)
+            acting.append(stiffness[places])
+            continue
+        nodes = -np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        x = (own - own[0]) / half - 1.0
+        # values of Lagrange's polynomials from Chebyshev's, which are orthogonal on the nodes
+        degree = np.arange(count)[:, None]
+        at_nodes, at_delays = (np.cos(degree * np.arccos(np.clip(each, -1.0, 1.0))) for each in (nodes, x))
+        at_nodes *= np.where(degree == 0, 1.0, 2.0) / count
+        delays.append(own[0] + half * (nodes + 1.0))
+        acting.append(np.tensordot(at_nodes.T @ at_delays, stiffness[places], axes=1))
+    return np.concatenate(delays), np.concatenate(acting)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,7 +257,7 @@ class Hill:
         tip = self.tip.at(frequency)
         known = self.teeth.harmonics(h - 1, depth)
         # the first sign is that of the force on the tip: F = K (q - q(t - tau))
-        if known.delay.size == 1 and self.teeth.base > 1:
+        if known.delay.size == 1 and abs(self.teeth.base * known.delay[0] - 2.0 * np.pi) < 1e-9:
             factor = 1.0 - np.exp(-1j * omega * known.delay[0] / self.speed)
             wide = known.stiffness[0][apart].transpose(1, 0, 2, 3).reshape(h, r * h, r) @ (factor[:, None, None, None] * tip)
         else:

@@ -66,7 +66,7 @@ class MultiFrequency:
 
     def operations(self, process: MillingProcess, speeds: FloatArray, top: float, max_depth: float) -> FloatArray:
         """Return the matrices of each speed times the cubes of their sizes: what their eigenvalues cost."""
-        passing = (process.cutter.teeth if process.cutter.equally_spaced else 1) * speeds
+        passing = process.cutter.symmetry * speeds
         reach = top / passing if self.harmonics is None else np.full(speeds.size, float(self.harmonics))
         return _MATRICES * (4.0 + _ROWS * reach) ** 3
 

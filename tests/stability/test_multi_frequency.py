@@ -18,6 +18,7 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.hill import fewer_delays
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.tip_modes import TipModes
@@ -316,3 +317,22 @@ def test_process_damping_agrees_with_a_march_through_time(rpm):
     np.testing.assert_allclose(found.chatter_frequency, marched.chatter_frequency, rtol=2e-5)
     undamped = stability_lobes(tip(SKEWED), MillingProcess(process.cutter, COEFFICIENTS, HALF_DOWN, 0.3), [rpm * RPM], 30e-3, MULTI)
     assert found.limit_depth[0] > undamped.limit_depth[0]
+
+
+@pytest.mark.parametrize(
+    ("delays", "most"), [(np.linspace(1.5, 1.6, 80), 25), (np.r_[np.linspace(1.4, 1.5, 50), np.linspace(1.7, 1.8, 50)], 50)]
+)
+def test_fewer_delays_act_as_many(delays, most):
+    """Teeth with a helix of their own have as many delays as nodes: phases of all frequencies up to the highest stay what they are."""
+    rng = np.random.default_rng(1)
+    acting = rng.standard_normal((delays.size, 3, 2, 2)) + 1j * rng.standard_normal((delays.size, 3, 2, 2))
+    fewer, grouped = fewer_delays(delays, acting, 120.0)
+    assert fewer.size < most
+    for order in (0.0, 33.3, -120.0):
+        wanted = np.tensordot(np.exp(-1j * order * delays), acting, axes=1)
+        np.testing.assert_allclose(np.tensordot(np.exp(-1j * order * fewer), grouped, axes=1), wanted, atol=1e-9 * np.abs(acting).sum())
+
+
+def test_few_delays_stay_what_they_are():
+    delays, acting = np.array([1.4, 1.7]), np.ones((2, 1))
+    assert fewer_delays(delays, acting, 50.0)[0].tolist() == delays.tolist()
