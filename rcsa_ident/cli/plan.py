@@ -69,6 +69,14 @@ def plan(
         ),
     ] = None,
     feed_per_tooth_mm: Annotated[float, typer.Option(help="Feed per tooth, mm.")] = 0.1,
+    chip_thickness_mm: Annotated[
+        float | None,
+        typer.Option(
+            help="Largest chip thickness, mm, in place of the feed: each cutter takes the feed per tooth that makes it, a high-feed one "
+            "several times that of a wall.",
+            show_default=False,
+        ),
+    ] = None,
     margin: Annotated[float, typer.Option(help="Least ratio of the stability limit to the depth.")] = 1.5,
     from_: Annotated[
         float | None,
@@ -111,6 +119,7 @@ def plan(
         engagement(immersion, strategy, entry_deg, exit_deg),
         feed_angle("+X" if feed_direction is None else feed_direction),
         margin,
+        chip_thickness=None if chip_thickness_mm is None else positive("--chip-thickness-mm", chip_thickness_mm, "mm") * 1e-3,
     )
     low, high = data["band_hz"]
     stages = Stages(quiet=json_)

@@ -134,6 +134,7 @@ def test_noise_of_a_campaign(tmp_path):
         (["--depths-mm", "50"], "none of"),
         (["--speed-to", "7000"], "--speed-to"),
         (["--margin", "0.5"], "margin"),
+        (["--chip-thickness-mm", "0"], "--chip-thickness-mm"),
         (["--immersion", "2"], "immersion"),
         (["--noise-nm", "0"], "--noise-nm"),
         (["--band", "0"], "--band"),
@@ -146,6 +147,15 @@ def test_bad_input_is_one_sentence_and_exit_code_2(tmp_path, more, words):
     assert words in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
     assert not (tmp_path / "PLAN.toml").exists()
+
+
+def test_the_feed_of_a_chip(tmp_path):
+    """A wall's chip is thickest where it is cut nearest to the feed's normal: between 120 and 150 degrees, sin 120."""
+    asked = ("--cuts", 2, "--entry-deg", 120, "--exit-deg", 150, "--feed-direction", "+X", "--chip-thickness-mm", 0.05)
+    run(result_in(tmp_path), *options(tmp_path, *asked))
+    feeds = {cut["feed_per_tooth_mm"] for cut in tomllib.loads((tmp_path / "PLAN.toml").read_text(encoding="utf-8"))["cuts"]}
+    assert len(feeds) == 1
+    assert feeds.pop() == pytest.approx(0.05 / np.sin(np.deg2rad(120.0)), rel=1e-3)
 
 
 def test_speeds_that_nobody_knows_are_asked_for(tmp_path):
