@@ -158,7 +158,8 @@ def summary(text: str) -> dict[str, Any]:
     tooling = tooling_of(text)
     cutter = tooling.cutter
     own = parsed(text).get("name", "")
-    return {"teeth": cutter.teeth, "diameter_mm": cutter.diameter * 1e3, "stickout_mm": tooling.assembly.stickout * 1e3, "label": own[:200]}
+    told = {"teeth": cutter.teeth, "diameter_mm": cutter.diameter * 1e3, "stickout_mm": tooling.assembly.stickout * 1e3}
+    return told | {"shape": str(cutter.shape), "label": own[:200]}
 
 
 def answer_of(document: Document) -> ToolingAnswer:

@@ -165,6 +165,7 @@ class ToolingSummary(Answer):
     teeth: int
     diameter_mm: float
     stickout_mm: float
+    shape: str = Field("flat", description="Of the cutter; one that was written before shapes were told is flat.")
     label: Line
     changed: str
     etag: str

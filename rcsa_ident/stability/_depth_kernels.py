@@ -11,8 +11,8 @@ import math
 import numba
 import numpy as np
 
-#: Roots over the depth that are kept at each frequency and eigenvalue, and steps to each of them.
-_ROOTS, _STEPS = 2, 30
+#: Roots over the depth that are kept at each frequency and eigenvalue, steps to each of them, and depths that are passed at once.
+_ROOTS, _STEPS, _STRIDE = 2, 30, 4
 #: Largest change of the phase from one frequency to the next that is still the same eigenvalue's [rad].
 _JUMP = 1.0
 
@@ -160,6 +160,38 @@ def _product(stiffness, tip, matrix):
 
 
 @numba.njit(cache=True)
+def _crossing(before, after, tip, k, below, above, scratch):
+    """Return the share of a step between two stiffnesses at which 2 Re v = 1, and the eigenvalue v, the k-th, there."""
+    matrix, between, tried = scratch
+    r = tip.shape[0]
+    low, high = 0.0, 1.0
+    at_low, at_high = 2.0 * below.real - 1.0, 2.0 * above[k].real - 1.0
+    share, value, side = 1.0, above[k], 0
+    for _ in range(_STEPS):
+        share = low - at_low * (high - low) / (at_high - at_low)
+        for a in range(r):
+            for b in range(r):
+                between[a, b] = before[a, b] + share * (after[a, b] - before[a, b])
+            tried[a] = above[a]
+        _product(between, tip, matrix)
+        eigenvalues(matrix, tried)
+        value = tried[k]
+        at = 2.0 * value.real - 1.0
+        if abs(at) < 1e-9:
+            break
+        # regula falsi; an end that stays for a second time counts half
+        if at * at_low > 0.0:
+            low, at_low = share, at
+            at_high *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            high, at_high = share, at
+            at_low *= 0.5 if side == -1 else 1.0
+            side = -1
+    return share, value
+
+
+@numba.njit(cache=True)
 def boundaries(tips, depths, stiffness):
     """Return the depths at which 2 Re v = 1 and the phases pi + 2 arg v there, shapes (n, r, roots); not a number where there is none.
 
@@ -181,44 +213,35 @@ def boundaries(tips, depths, stiffness):
         for k in range(r):
             below[k] = 0.0j
             found[k] = 0
-        for d in range(count):
-            _product(stiffness[d], tips[i], matrix)
+        first = 0
+        while first < count:
+            # several steps at once; one by one where an eigenvalue has changed its side
+            last = min(first + _STRIDE, count) - 1
+            _product(stiffness[last], tips[i], matrix)
             eigenvalues(matrix, above)
+            changed = False
             for k in range(r):
-                if found[k] < _ROOTS and (2.0 * below[k].real - 1.0) * (2.0 * above[k].real - 1.0) < 0.0:
-                    low, high = 0.0, 1.0
-                    at_low, at_high = 2.0 * below[k].real - 1.0, 2.0 * above[k].real - 1.0
-                    value = above[k]
-                    share, side = 1.0, 0
-                    for _ in range(_STEPS):
-                        share = low - at_low * (high - low) / (at_high - at_low)
-                        for a in range(r):
-                            for b in range(r):
-                                before = stiffness[d - 1, a, b] if d > 0 else 0.0
-                                between[a, b] = before + share * (stiffness[d, a, b] - before)
-                        _product(between, tips[i], matrix)
-                        for a in range(r):
-                            tried[a] = above[a]
-                        eigenvalues(matrix, tried)
-                        value = tried[k]
-                        at = 2.0 * value.real - 1.0
-                        if abs(at) < 1e-9:
-                            break
-                        # regula falsi; an end that stays for a second time counts half
-                        if at * at_low > 0.0:
-                            low, at_low = share, at
-                            at_high *= 0.5 if side == 1 else 1.0
-                            side = 1
-                        else:
-                            high, at_high = share, at
-                            at_low *= 0.5 if side == -1 else 1.0
-                            side = -1
-                    start = depths[d - 1] if d > 0 else 0.0
-                    depth[i, k, found[k]] = start + share * (depths[d] - start)
-                    phase[i, k, found[k]] = math.pi + 2.0 * math.atan2(value.imag, value.real)
-                    found[k] += 1
-            for k in range(r):
-                below[k] = above[k]
+                changed = changed or (found[k] < _ROOTS and (2.0 * below[k].real - 1.0) * (2.0 * above[k].real - 1.0) < 0.0)
+            if not changed:
+                for k in range(r):
+                    below[k] = above[k]
+                first = last + 1
+                continue
+            for d in range(first, last + 1):
+                _product(stiffness[d], tips[i], matrix)
+                eigenvalues(matrix, above)
+                before, start = stiffness[max(d - 1, 0)], depths[max(d - 1, 0)]
+                if d == 0:
+                    before, start = np.zeros_like(before), 0.0
+                for k in range(r):
+                    if found[k] < _ROOTS and (2.0 * below[k].real - 1.0) * (2.0 * above[k].real - 1.0) < 0.0:
+                        share, value = _crossing(before, stiffness[d], tips[i], k, below[k], above, (matrix, between, tried))
+                        depth[i, k, found[k]] = start + share * (depths[d] - start)
+                        phase[i, k, found[k]] = math.pi + 2.0 * math.atan2(value.imag, value.real)
+                        found[k] += 1
+                for k in range(r):
+                    below[k] = above[k]
+            first = last + 1
     return depth, phase
 
 

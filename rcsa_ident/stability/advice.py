@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from rcsa_ident.stability.pockets import peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_rpm
+
+#: Depths at which it is asked what a cutter with a shape takes.
+_DEPTHS = 49
 
 
 class Bound(StrEnum):
@@ -126,11 +130,10 @@ def usable_depths(
     speed = lobes.spindle_speed
     stable = lobes.recommended_depth(tolerance, probability, reserve)
     torque, power = drive.torque_at(speed), drive.power_at(speed)
-    removal_rate = None
+    taken = None
     if process.feed_per_tooth is not None:
-        # all grow in proportion to the depth
-        load = spindle_load(process.cutter, process.conditions(1.0, 1.0), process.coefficients)
-        torque, power = torque / load.torque, power / (load.torque * speed)
+        taken = _taken(process, lobes.max_depth)
+        torque, power = (np.interp(most, taken.torque, taken.depth, right=np.inf) for most in (torque, power / speed))
     elif np.any(np.isfinite(drive.torque) | np.isfinite(drive.power)):
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: power and torque grow with it")
     by_torque, by_power = lobes.searched(torque, reserve), lobes.searched(power, reserve)
@@ -141,10 +144,36 @@ def usable_depths(
     bound = [
         Bound.SPEED if d == 0.0 else Bound.DEPTH if d == np.inf else names[k] for d, k in zip(depth.tolist(), which.tolist(), strict=True)
     ]
-    if process.feed_per_tooth is not None:
-        removal_rate = depth * load.removal_rate * speed
+    removal_rate = None
+    if taken is not None:
+        removal_rate = np.interp(depth, taken.depth, taken.volume, right=np.inf) * speed
     deepest = (1.0 - reserve) * lobes.max_depth
     return UsableDepths(speed, lobes.nominal, stable, by_power, by_torque, depth, tuple(bound), removal_rate, deepest)
+
+
+class _Taken(NamedTuple):
+    """What a cut takes from the spindle over its depth.
+
+    Parameters
+    ----------
+    depth : array, shape (n,) [m]
+        Rising from 0; straight lines in between.
+    torque : array, shape (n,) [N m]
+    volume : array, shape (n,) [m^3/rad]
+    """
+
+    depth: FloatArray
+    torque: FloatArray
+    volume: FloatArray
+
+
+def _taken(process: MillingProcess, deepest: float) -> _Taken:
+    """What a cut takes: along a wall in proportion to its depth, of a shape as it is at depths up to the deepest one."""
+    reach = process.within_reach(deepest)
+    depth = np.array([0.0, 1e3 * deepest]) if process.is_plain else reach * np.linspace(0.0, 1.0, _DEPTHS) ** 2
+    loads = [spindle_load(process.cutter, process.conditions(1.0, float(a)), process.coefficients) for a in depth[1:]]
+    torque, volume = (np.array([0.0, *(getattr(load, name) for load in loads)]) for name in ("torque", "removal_rate"))
+    return _Taken(depth, torque, volume)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -18,7 +18,7 @@ from rcsa_ident.stability.regeneration import directions_of, regeneration
 #: Ratio of the depths at which the mean stiffness is asked, and how far below the largest they begin.
 _RATIO, _LEAST = 1.08, 1e-3
 #: Change of a direct receptance, as a share, from one frequency to the next; and into how many at most those of the receptance are cut.
-_CHANGE, _MOST = 0.02, 4
+_CHANGE, _MOST = 0.05, 4
 
 
 class Marched(NamedTuple):

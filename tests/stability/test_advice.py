@@ -12,6 +12,7 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.advice import Bound, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE
@@ -48,6 +49,20 @@ def test_power_torque_and_chatter_each_have_their_range():
     assert best[0].power == pytest.approx(4000.0)
     assert best[0].removal_rate == pytest.approx(found.removal_rate.max())
     assert best[0].limit == 8e-3
+
+
+def test_what_a_shape_takes_is_not_in_proportion_to_its_depth():
+    """A ball end: at the depth that is told for torque and for power the spindle gives just that, and no cut beyond the edge is asked."""
+    ball = Cutter(2, 12e-3, helix=0.5, profile=Profile.ball(12e-3))
+    process = MillingProcess(ball, CuttingCoefficients(900e6, 0.3, tangential_edge=2e4), Engagement(0.0, np.pi), feed_per_tooth=1e-4)
+    limits = lobes(np.full(7, 5e-3), deepest=6e-3)
+    for drive, name in ((SpindleDrive.flat(torque=0.3), "by_torque"), (SpindleDrive.flat(power=250.0), "by_power")):
+        found = usable(limits, process, drive)
+        for speed, depth, rate in zip(found.spindle_speed, getattr(found, name), found.removal_rate, strict=True):
+            load = spindle_load(ball, process.conditions(speed, depth), process.coefficients)
+            assert (load.torque / 0.3 if name == "by_torque" else load.power / 250.0) == pytest.approx(1.0, rel=2e-3)
+            assert rate == pytest.approx(load.removal_rate, rel=2e-3)
+    assert np.all(np.isfinite(usable(lobes(np.full(7, 7e-3), deepest=8e-3), process).removal_rate))
 
 
 def test_where_nothing_limits_the_cut_no_depth_is_recommended():

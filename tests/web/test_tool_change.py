@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from api.client import Client
+from tests.fixtures import by_hand
 from tests.web.conftest import ROOT
 
 pytest.importorskip("playwright")
@@ -39,6 +40,29 @@ def test_a_material_of_the_library(opened, client: Client, shop: str):
     again = opened(page.url[page.url.index("#") :])
     expect(again.get_by_label("Material", exact=True)).to_have_value(steel.name)
     expect(again.locator(".best")).to_have_attribute("data-rpm", f"{advice.spindle_speed_rpm:g}", timeout=30_000)
+
+
+def test_a_shape_is_asked_what_stands_around_it(opened, client: Client, shop: str):
+    """A block's two sides in place of immersion and strategy; a wall is not asked, and the tool card says the same."""
+    page = opened(f"#/change?machine={shop}&tooling=T1")
+    expect(page.locator(".best")).to_be_visible(timeout=30_000)
+    expect(page.get_by_label("Stock beside the path")).to_be_hidden()
+    client.write_tooling("BALL", by_hand.TOOLING.replace("\ndiameter_mm = 12.0", '\nshape = "ball"\ndiameter_mm = 12.0'))
+    page = opened(f"#/change?machine={shop}&tooling=BALL&from=8000&to=10000&step=1000&deep=2&kac=0.2")
+    expect(page.locator(".best")).to_be_visible(timeout=60_000)
+    page.get_by_label("Stock beside the path").select_option("block")
+    expect(page.get_by_label("Radial immersion")).to_be_hidden()
+    expect(page.locator('[data-field="cut.y_from_mm"] .fault')).to_contain_text("A number is needed")
+    page.get_by_label("Block from").fill("-6")
+    page.get_by_label("Block to").fill("-2")
+    cut = {"stock": "block", "y_from_mm": -6.0, "y_to_mm": -2.0, "feed_direction": "+X", "feed_per_tooth_mm": 0.1, "kac": 0.2}
+    speeds = {"from_rpm": 8000, "to_rpm": 10000, "step_rpm": 1000}
+    advice = client.advice(shop, "BALL", cut=cut, speeds=speeds, max_depth_mm=2).toolings[0].highest_removal[0]
+    expect(page.locator(".best")).to_have_attribute("data-rpm", f"{advice.spindle_speed_rpm:g}", timeout=60_000)
+    expect(page.locator(".best")).to_contain_text(f"{advice.axial_depth_mm:.2f}")
+    assert "stock=block" in page.url
+    card = opened(page.url[page.url.index("#") :].replace("#/change", "#/card"))
+    expect(card.locator("body")).to_contain_text("a block from", timeout=60_000)
 
 
 def test_process_damping_needs_both_its_numbers(opened, shop: str):

@@ -9,9 +9,12 @@ const seriesOf = (i) => SERIES[i % SERIES.length];
 /** Where the lobes begin above the chatter frequencies, as a share of the chart's height. */
 const UPPER = 0.33;
 
+/** Radial depth of a cut [mm]. */
+export const widthOf = (cut, diameter) => (cut.stock === "block" ? Math.min(cut.y_to_mm - cut.y_from_mm, diameter) : cut.immersion * diameter);
+
 /** Material removed per depth and speed [cm^3/min per mm and rev/min]. */
-export function removalPer(tooling, immersion, feed) {
-  return (tooling.diameter_mm * immersion * tooling.teeth * feed) / 1000;
+export function removalPer(tooling, cut, feed) {
+  return (widthOf(cut, tooling.diameter_mm) * tooling.teeth * feed) / 1000;
 }
 
 /**

@@ -9,7 +9,7 @@ const MOST = 12;
 /** The tooling that was written last is what somebody is working on. */
 const newest = (toolings) => toolings.reduce((last, each) => (each.changed >= last.changed ? each : last));
 /** What is folded away until an address says something of it. */
-const FURTHER = ["method", "material", "deep", "ktc", "krc", "runout", "land", "dent", "mu", "power", "torque"];
+const FURTHER = ["method", "material", "deep", "ktc", "krc", "kac", "runout", "land", "dent", "mu", "power", "torque"];
 
 /**
  * The form: `element`, `button`, `state()` for the address, `body()` for the service, `problem()`, `slow()`, `tested`, `tell()`.
@@ -36,6 +36,13 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
     ["up", "Up milling"],
   ];
   const strategy = picked("st", strategies, "down");
+  const stocks = [
+    ["", "As where it cut before"],
+    ["block", "A block"],
+  ];
+  const stock = picked("stock", stocks, "");
+  // along a wall a block is but another radial immersion
+  const shaped = toolings.some((tooling) => tooling.shape !== "flat") || stock.value !== "";
   const direction = picked("fd", ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]), "+X");
   const method = picked("method", kinds, QUICK);
   // a measured flange says nothing of a workpiece
@@ -59,6 +66,16 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
     button.hidden = !slow();
   };
 
+  const stockField = field("Stock beside the path", stock, { name: "cut.stock" });
+  stockField.hidden = !shaped;
+  const strategyField = field("Strategy", strategy, { name: "cut.strategy" });
+  const followStock = () => {
+    const block = stock.value === "block";
+    for (const each of [fields.ya, fields.yb]) each.hidden = !block;
+    for (const each of [fields.im, strategyField]) each.hidden = block;
+  };
+  followStock();
+
   // on a phone the answer stands higher than the conditions, which are told in a line
   const inShort = h("span", { class: "soft" });
   const conditions = h(
@@ -72,15 +89,18 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
       h(
         "div",
         { class: "fields" },
+        stockField,
         fields.im,
-        field("Strategy", strategy, { name: "cut.strategy" }),
+        strategyField,
+        fields.ya,
+        fields.yb,
         fields.fz,
         field("Feed direction", direction, { name: "cut.feed_direction" }),
       ),
     ),
     h("fieldset", null, h("legend", { class: "unseen" }, "Speeds"), h("div", { class: "fields" }, fields.from, fields.to, fields.step)),
   );
-  const { ktc, krc, power, torque, deep, land, dent, mu } = fields;
+  const { ktc, krc, kac, power, torque, deep, land, dent, mu } = fields;
   const element = h(
     "form",
     { class: "card change-form", novalidate: true },
@@ -99,7 +119,7 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
       field("Material", material, { name: "cut.material" }),
       source,
       field("Method", method, { name: "method" }),
-      h("div", { class: "fields" }, ktc, krc, power, torque, deep, fields.runout, land, dent, mu),
+      h("div", { class: "fields" }, ktc, krc, shaped ? kac : null, power, torque, deep, fields.runout, land, dent, mu),
       h(
         "p",
         { class: "small soft" },
@@ -112,14 +132,16 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
   element.addEventListener("input", (event) => {
     if (event.target.closest(".picks, .picks-box")) return;
     follow();
+    followStock();
     onchange(false);
   });
   follow();
 
-  const choice = () => ({ strategy: strategy.value, direction: direction.value, method: method.value, material: material.value });
+  const choice = () => ({ stock: stock.value, strategy: strategy.value, direction: direction.value, method: method.value, material: material.value });
   const state = () => ({
     machine: machine.id,
     tooling: [...chosen],
+    stock: stock.value,
     st: strategy.value,
     fd: direction.value,
     method: method.value,
@@ -133,11 +155,12 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
   const tell = () => {
     const shown = (key, kind) => `${fields[key].input.value}\u00a0${unit(kind)}`;
     const speeds = `${fields.from.input.value} to ${shown("to", "speed")}`;
-    const cut = `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion, ${shown("fz", "feed")} per tooth`;
-    fill(inShort, `${cut}, ${speeds}`);
+    const block = () => `a block from ${fields.ya.input.value} to ${shown("yb", "length")}`;
+    const beside = () => `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion`;
+    fill(inShort, `${stock.value === "block" ? block() : beside()}, ${shown("fz", "feed")} per tooth, ${speeds}`);
   };
   const body = () => bodyOf(machine.id, [...chosen], fields, { ...choice(), tested: form.tested.cuts });
-  return Object.assign(form, { element, state, tell, slow, body, problem: () => checked(fields, chosen) });
+  return Object.assign(form, { element, state, tell, slow, body, problem: () => checked(fields, chosen, stock.value) });
 }
 
 function toolingPicks(toolings, chosen, onchange) {

@@ -15,6 +15,8 @@ export async function methods() {
 // knows what is possible, and says what is usual beside it
 export const NUMBERS = [
   ["im", "percent", 50, "cut.immersion", 0.1, 100, "Radial immersion"],
+  ["ya", "length", null, "cut.y_from_mm", -500, 500, "Block from"],
+  ["yb", "length", null, "cut.y_to_mm", -500, 500, "Block to"],
   ["fz", "feed", 0.1, "cut.feed_per_tooth_mm", 0, Infinity, "Feed per tooth"],
   ["from", "speed", 4000, "speeds.from_rpm", 100, 200_000, "From"],
   ["to", "speed", 20_000, "speeds.to_rpm", 100, 200_000, "To"],
@@ -22,6 +24,7 @@ export const NUMBERS = [
   ["deep", "depth", 10, "max_depth_mm", 1e-3, 500, "Deepest that is asked for"],
   ["ktc", "pressure", null, "cut.ktc_mpa", 0, Infinity, "Tangential coefficient"],
   ["krc", "none", null, "cut.krc", -Infinity, Infinity, "Radial over tangential"],
+  ["kac", "none", null, "cut.kac", -Infinity, Infinity, "Axial over tangential"],
   ["land", "displacement", null, "cut.wear_land_um", 0.01, 1000, "Wear land"],
   ["dent", "indentation", null, "cut.indentation", 1e9, 1e17, "Indentation"],
   ["mu", "none", 0.3, "cut.friction", 0, 2, "Friction of the worn land"],
@@ -38,13 +41,15 @@ export function runoutOf(query) {
   return out?.length ? out : null;
 }
 
-export function bodyOf(id, names, fields, { strategy, direction, method, material, tested }) {
+export function bodyOf(id, names, fields, { stock, strategy, direction, method, material, tested }) {
   const value = (key) => fields[key].input.base;
-  const cut = { immersion: value("im") / 100, strategy, feed_direction: direction };
+  const beside = stock === "block" ? { stock, y_from_mm: value("ya"), y_to_mm: value("yb") } : { immersion: value("im") / 100, strategy };
+  const cut = { ...beside, feed_direction: direction };
   for (const [key, name] of [
     ["fz", "feed_per_tooth_mm"],
     ["ktc", "ktc_mpa"],
     ["krc", "krc"],
+    ["kac", "kac"],
     ["land", "wear_land_um"],
     ["dent", "indentation"],
   ])
@@ -63,11 +68,13 @@ export function bodyOf(id, names, fields, { strategy, direction, method, materia
 }
 
 /** What can be seen to be wrong before anything is sent, in the units that are shown. */
-export function checked(fields, chosen) {
+export function checked(fields, chosen, stock) {
   const errors = [];
+  const sides = ["ya", "yb"];
   for (const [key, kind, usual, name, least, most] of NUMBERS) {
     const { base, value } = fields[key].input;
-    if (base === null && (usual === null || key === "fz")) continue;
+    if (stock === "block" ? key === "im" : sides.includes(key)) continue;
+    if (base === null && (usual === null || key === "fz") && !sides.includes(key)) continue;
     if (base === null) errors.push({ field: name, found: "nothing", allowed: "A number is needed here" });
     else if (!(base >= least && base <= most)) {
       errors.push({ field: name, found: value, allowed: `From ${text(kind, least, { bare: true })} to ${text(kind, most)}` });
@@ -78,6 +85,8 @@ export function checked(fields, chosen) {
     const allowed = `A number for each tooth, from ${text("displacement", -OUT, { bare: true })} to ${text("displacement", OUT)}`;
     errors.push({ field: "cut.runout_um", found: fields.runout.input.value, allowed });
   }
+  if (!errors.length && stock === "block" && fields.yb.input.base <= fields.ya.input.base)
+    errors.push({ field: "cut.y_to_mm", found: text("length", fields.yb.input.base), allowed: "Above the first side" });
   const [from, upTo] = [fields.from.input.base, fields.to.input.base];
   if (!errors.length && upTo < from)
     errors.push({ field: "speeds.to_rpm", found: text("speed", upTo), allowed: "Not below the first speed" });

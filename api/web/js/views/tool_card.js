@@ -2,6 +2,7 @@
 import { described, get, part, post } from "../api.js";
 import { add, empty, h, head, link, note, table, waiting } from "../dom.js";
 import { libraryDrawing } from "../drawing.js";
+import { widthOf } from "../figures.js";
 import { followLobes } from "../jobs.js";
 import { to } from "../router.js";
 import { plain, q, u } from "../units.js";
@@ -39,6 +40,7 @@ function questionOf(query, id, name) {
   const fields = Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, { input: { base: given(key, usual) } }]));
   fields.runout = { input: { base: runoutOf(query) } };
   return bodyOf(id, [name], fields, {
+    stock: query.get("stock") ?? "",
     strategy: query.get("st") ?? "down",
     direction: query.get("fd") ?? "+X",
     method: query.get("method") ?? QUICK,
@@ -85,8 +87,12 @@ function sheet({ name, machine, keys, question, found, software, versions }) {
     h("h2", null, "Conditions"),
     facts([
       ["Machine", machine.name],
-      ["Strategy", cut.strategy === "up" ? "up milling" : "down milling"],
-      ["Radial immersion", [`${plain(100 * cut.immersion, 1)} %, `, q("length", cut.immersion * keys.cutter.diameter_mm, { digits: 2 }), " wide"]],
+      ...(cut.stock === "block"
+        ? [["Stock", ["a block from ", q("length", cut.y_from_mm, { digits: 2 }), " to ", q("length", cut.y_to_mm, { digits: 2 }), " beside the path"]]]
+        : [
+            ["Strategy", cut.strategy === "up" ? "up milling" : "down milling"],
+            ["Radial immersion", [`${plain(100 * cut.immersion, 1)} %, `, q("length", widthOf(cut, keys.cutter.diameter_mm), { digits: 2 }), " wide"]],
+          ]),
       ["Feed per tooth", cut.feed_per_tooth_mm === undefined ? "not given" : q("feed", cut.feed_per_tooth_mm)],
       ["Feed direction", cut.feed_direction.replace("-", "−")],
       ["Material", cut.material ?? (cut.ktc_mpa ? q("pressure", cut.ktc_mpa) : "as in the identification")],
