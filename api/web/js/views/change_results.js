@@ -12,7 +12,8 @@ export function results(place, found, { toolings, body, tested, ontested, look }
   const question = body.lobes;
   const summaries = found.lobes.map((each) => toolings.find((t) => t.name === each.tooling));
   const feed = question.cut.feed_per_tooth_mm ?? null;
-  const removal = summaries.map((t) => (feed === null || !t ? null : removalPer(t, question.cut, feed)));
+  // what a shape removes is no share of its depth: the recommended cuts tell it
+  const removal = summaries.map((t) => (feed === null || t?.shape !== "flat" ? null : removalPer(t, question.cut, feed)));
   // whoever is writing a speed goes on
   const writing = place.querySelector(".reader input:focus")?.value;
   const lobes = lobesCard(found, removal, question, tested, ontested, look);
