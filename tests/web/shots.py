@@ -90,9 +90,21 @@ def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable
         page.get_by_text("Waves along the edges").click()
         page.wait_for_timeout(800)
 
+    def shape_lacking(page: Page) -> None:
+        page.get_by_label("Shape", exact=True).select_option("taper-barrel")
+        page.wait_for_timeout(500)
+
+    def shape_refused(page: Page) -> None:
+        page.get_by_label("Shape", exact=True).select_option("bull-nose")
+        page.get_by_label("Corner radius", exact=True).fill("7")
+        page.get_by_text("Waves along the edges").click()
+        page.get_by_label("Wave amplitude", exact=True).fill("0.2")
+        page.wait_for_timeout(800)
+
     def own_outline(page: Page) -> None:
         page.get_by_label("Shape", exact=True).select_option("profile")
-        page.wait_for_timeout(500)
+        page.get_by_label("Points of the outline [mm]", exact=True).fill("0 0, 3 0, 6 3 3, 6 20")
+        page.wait_for_timeout(800)
 
     def edits_left(page: Page) -> None:
         page.get_by_label("Teeth", exact=True).fill("7")
@@ -113,6 +125,8 @@ def states(known: dict[str, str], folder: Path) -> dict[str, tuple[str, Callable
         "forces_shown": (known["forces"], forces_shown),
         "holder_taken": (known["new_tooling"], holder_taken),
         "shaped": (known["new_tooling"], shaped),
+        "shape_lacking": (known["new_tooling"], shape_lacking),
+        "shape_refused": (known["new_tooling"], shape_refused),
         "own_outline": (known["new_tooling"], own_outline),
         "edits_left": (known["tooling"], edits_left),
         "intake": (known["machines"], intake),

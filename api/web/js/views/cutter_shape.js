@@ -5,7 +5,7 @@ import { SHAPES } from "./tooling_start.js";
 
 // [key, label, kind, hint]
 const DIMENSIONS = [
-  ["corner_radius_mm", "Corner radius", "length", "Empty: sharp, or not known"],
+  ["corner_radius_mm", "Corner radius", "length", "RE"],
   ["cutting_edge_angle_deg", "Cutting edge angle", "degree", "KAPR, from the floor to the edge"],
   ["taper_deg", "Angle from the axis", "degree", "Taper of each side"],
   ["largest_diameter_mm", "Largest diameter", "length", "DCX, where the edge ends"],
@@ -18,48 +18,44 @@ const DIMENSIONS = [
   ["neck_diameter_mm", "Neck diameter", "length", "Behind the ball"],
   ["tip_length_mm", "Tip length", "length", "Of the straight edge below the arc"],
 ];
-// what draws each shape; those that it cannot do without come first
-const ASKED = {
-  flat: ["corner_radius_mm"],
-  "bull-nose": ["corner_radius_mm"],
-  ball: [],
-  tapered: ["taper_deg", "corner_radius_mm", "cutting_depth_mm"],
-  face: ["cutting_edge_angle_deg", "cutting_depth_mm", "largest_diameter_mm", "corner_radius_mm", "wiper_mm"],
-  "high-feed": ["cutting_edge_angle_deg", "cutting_depth_mm", "profile_radius_mm", "corner_radius_mm", "wiper_mm"],
-  radius: ["corner_radius_mm", "tip_length_mm"],
-  barrel: ["profile_radius_mm", "axial_distance_mm", "cutting_depth_mm", "corner_radius_mm", "upper_radius_mm"],
-  lens: ["profile_radius_mm", "corner_radius_mm", "cutting_depth_mm"],
-  oval: ["profile_radius_mm", "corner_radius_mm", "cutting_depth_mm"],
-  "taper-barrel": [
-    "profile_radius_mm",
-    "corner_radius_mm",
-    "taper_deg",
-    "axial_distance_mm",
-    "cutting_depth_mm",
-    "tip_diameter_mm",
-    "upper_radius_mm",
-  ],
-  lollipop: ["neck_diameter_mm"],
-  chamfer: ["taper_deg", "tip_diameter_mm"],
-  dovetail: ["taper_deg", "cutting_depth_mm", "corner_radius_mm"],
-  profile: ["profile"],
+// what a corner radius is of, where it is no corner that may be left out
+const CORNERS = {
+  "bull-nose": "RE, from floor to wall",
+  radius: "Of the hollow arc",
+  oval: "Of the ball at the tip",
+  "taper-barrel": "Of the ball at the tip",
+  ball: "Half of the diameter",
+  lollipop: "Half of the diameter",
 };
-
-// without these a shape cannot be drawn; where two stand together, one of them is enough
-const NEEDED = {
-  "bull-nose": ["corner_radius_mm"],
-  tapered: ["taper_deg"],
-  face: ["cutting_edge_angle_deg", ["cutting_depth_mm", "largest_diameter_mm"]],
-  "high-feed": [["cutting_edge_angle_deg", "profile_radius_mm"], "cutting_depth_mm"],
-  radius: ["corner_radius_mm"],
-  barrel: ["profile_radius_mm", "axial_distance_mm", "cutting_depth_mm"],
-  lens: ["profile_radius_mm"],
-  oval: ["profile_radius_mm", "corner_radius_mm", "cutting_depth_mm"],
-  "taper-barrel": ["profile_radius_mm", "corner_radius_mm", "taper_deg", "axial_distance_mm", "cutting_depth_mm"],
-  lollipop: ["neck_diameter_mm"],
-  chamfer: ["taper_deg"],
-  dovetail: ["taper_deg", "cutting_depth_mm"],
-  profile: ["profile"],
+/**
+ * What each shape is drawn by, as the service has it (`rcsa_ident.cutting.outlines`): it cannot do without what it needs, where two stand
+ * together without one of them; it may have more; and some is shown only where a file tells it.
+ */
+export const TAKES = {
+  flat: { may: ["corner_radius_mm"], told: ["cutting_depth_mm"] },
+  "bull-nose": { needs: [["corner_radius_mm"]], told: ["cutting_depth_mm"] },
+  ball: { told: ["corner_radius_mm", "cutting_depth_mm"] },
+  tapered: { needs: [["taper_deg"]], may: ["corner_radius_mm", "cutting_depth_mm"], told: ["largest_diameter_mm"] },
+  face: { needs: [["cutting_edge_angle_deg"], ["cutting_depth_mm", "largest_diameter_mm"]], may: ["corner_radius_mm", "wiper_mm"] },
+  "high-feed": {
+    needs: [
+      ["cutting_edge_angle_deg", "profile_radius_mm"],
+      ["cutting_depth_mm", "largest_diameter_mm"],
+    ],
+    may: ["corner_radius_mm", "wiper_mm"],
+  },
+  radius: { needs: [["corner_radius_mm"]], may: ["tip_length_mm"] },
+  barrel: { needs: [["profile_radius_mm"], ["axial_distance_mm"], ["cutting_depth_mm"]], may: ["corner_radius_mm", "upper_radius_mm"] },
+  lens: { needs: [["profile_radius_mm"]], may: ["corner_radius_mm", "cutting_depth_mm"] },
+  oval: { needs: [["profile_radius_mm"], ["corner_radius_mm"], ["cutting_depth_mm"]] },
+  "taper-barrel": {
+    needs: [["profile_radius_mm"], ["corner_radius_mm"], ["taper_deg"], ["axial_distance_mm"], ["cutting_depth_mm"]],
+    may: ["tip_diameter_mm", "upper_radius_mm"],
+  },
+  lollipop: { needs: [["neck_diameter_mm"]], told: ["corner_radius_mm"] },
+  chamfer: { needs: [["taper_deg"]], may: ["tip_diameter_mm"] },
+  dovetail: { needs: [["taper_deg"], ["cutting_depth_mm"]], may: ["corner_radius_mm"] },
+  profile: { needs: [["profile"]], told: ["corner_radius_mm"] },
 };
 
 const numbers = (words) =>
@@ -90,19 +86,29 @@ export function cutterShape(keys) {
     hint: "Of a rougher's edges; empty: smooth",
   });
   const wavelength = quantity("Wavelength", "length", wave.wavelength_mm ?? null, { name: "cutter.serration.wavelength_mm", hint: "Along the axis" });
-  // what stands in a file stays asked for, whatever the shape
-  const asked = () => ASKED[shape.value] ?? [];
+  const takes = () => ({ needs: [], may: [], told: [], ...TAKES[shape.value] });
+  const inFile = (key) => shape.value === (keys.shape ?? "flat") && (keys[key] ?? null) !== null;
+  const asked = () => [...takes().needs.flat(), ...takes().may, ...takes().told.filter(inFile)];
+  const boxOfShape = field("Shape", shape, { name: "cutter.shape", hint: "What the edges sweep over" });
   const lacking = h("div", { role: "status" });
   const label = (key) => boxes.get(key).querySelector("label").textContent.replace(" [mm]", "");
   const told = (key) => (key === "profile" ? points.value.trim() : boxes.get(key).input.base);
-  function show() {
-    for (const [key, box] of boxes) box.hidden = !asked().includes(key);
-    const missing = (NEEDED[shape.value] ?? []).filter((need) => ![need].flat().some(told));
-    const words = missing.map((need) => [need].flat().map(label).join(" or ").toLowerCase()).join(" and ");
-    fill(lacking, missing.length ? h("p", { class: "note doubt" }, `Without ${words} it is computed as a cylinder.`) : null);
+  /** Fields of the shape that is chosen, what it needs first. */
+  function ask() {
+    for (const box of boxes.values()) box.remove();
+    boxOfShape.after(...asked().map((key) => boxes.get(key)));
+    boxes.get("corner_radius_mm").querySelector(".hint").textContent = CORNERS[shape.value] ?? "Empty: sharp, or not known";
+    show();
   }
-  for (const input of [shape, points, ...[...boxes.values()].map((box) => box.input).filter(Boolean)]) input.addEventListener("input", show);
-  show();
+  function show() {
+    const missing = takes().needs.filter((need) => !need.some(told));
+    const words = missing.map((need) => need.map(label).join(" or ").toLowerCase());
+    const last = words.pop();
+    const all = words.length ? `${words.join(", ")} and ${last}` : last;
+    fill(lacking, last ? h("p", { class: "note doubt" }, `Without ${all} it is computed as a cylinder.`) : null);
+  }
+  for (const input of [points, ...[...boxes.values()].map((box) => box.input).filter(Boolean)]) input.addEventListener("input", show);
+  shape.addEventListener("input", ask);
 
   function write(cutter) {
     for (const key of boxes.keys()) delete cutter[key];
@@ -113,10 +119,6 @@ export function cutterShape(keys) {
         if (points.value.trim()) cutter.profile = points.value.split(/[,;\n]+/).filter((row) => row.trim()).map(numbers);
       } else if (boxes.get(key).input.base) cutter[key] = boxes.get(key).input.base;
     }
-    // an edge that ends somewhere ends there in any shape that has an end
-    if (keys.cutting_depth_mm && ["flat", "bull-nose", "ball"].includes(shape.value) && shape.value === (keys.shape ?? "flat"))
-      cutter.cutting_depth_mm = keys.cutting_depth_mm;
-    if (keys.largest_diameter_mm && shape.value === "tapered" && keys.shape === "tapered") cutter.largest_diameter_mm = keys.largest_diameter_mm;
     const waves = { amplitude_mm: amplitude.input.base, wavelength_mm: wavelength.input.base };
     if (waves.amplitude_mm || waves.wavelength_mm) {
       cutter.serration = { ...wave };
@@ -124,9 +126,8 @@ export function cutterShape(keys) {
       else delete cutter.serration[key];
     } else delete cutter.serration;
   }
-  const boxOfShape = field("Shape", shape, { name: "cutter.shape", hint: "What the edges sweep over" });
   const parts = [
-    h("div", { class: "fields" }, boxOfShape, ...boxes.values()),
+    h("div", { class: "fields" }, boxOfShape),
     lacking,
     h(
       "details",
@@ -135,5 +136,6 @@ export function cutterShape(keys) {
       h("div", { class: "fields" }, amplitude, wavelength),
     ),
   ];
+  ask();
   return { parts, write };
 }
