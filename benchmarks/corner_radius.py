@@ -3,7 +3,7 @@
 ``python -m benchmarks corner_radius``. A virtual machine cuts 0.4 mm deep, once with sharp end mills and once with a corner radius of
 0.5 mm: nothing else differs, not even the noise. Each campaign is identified with cutters as they are; the second one also as if they were
 sharp, which is what was computed before shapes were known, and as if a sharp drawing were good for 0.3 mm. Errors are those of
-`benchmarks.comparison`, [X, Y] of each tooling. The virtual machine takes
+`benchmarks.comparison`, [X, Y] of each tooling; a summary has their root mean square over all toolings. The virtual machine takes
 cutters apart in its own way: levels, arcs and chips in the time domain.
 
 The first table is of the forces alone: how wrong the lines of the cylinder are at the first five tooth orders, for half-immersion
@@ -101,11 +101,13 @@ def told(campaign: Campaign, radius: float, doubt: float = 0.0) -> Campaign:
 
 
 def run(scratch: Path, names: Sequence[str], seeds: Sequence[int]) -> None:
-    """Print the table of the identifications, medians over the search's seeds in percent, each row as it is there."""
+    """Print the table of the identifications, medians over the search's seeds in percent, each row as it is there; then the summary."""
     head = ("machine", "cut with", "identified with", "status", "cuts", "cut", "never cut, same holder", "other holder", "s")
     print("| " + " | ".join(head) + " |", "|---" * len(head) + "|", sep="\n", flush=True)
+    summary = ["", "| machine | sharp | told | untold | ± 0.3 mm |", "|---|---|---|---|---|"]
     for name in names:
         setup = setup_of(scratch, name)
+        whole = []
         cases = (
             (0.0, 0.0, 0.0, "sharp", "sharp"),
             (RADIUS, RADIUS, 0.0, "0.5 mm", "0.5 mm"),
@@ -125,6 +127,9 @@ def run(scratch: Path, names: Sequence[str], seeds: Sequence[int]) -> None:
             status = ", ".join(dict.fromkeys(str(each.status) for each in runs))
             row = f"| {name} | {words[0]} | {words[1]} | {status} | {len(runs[0].cut_ids)} | {told_errors} | {seconds:.0f} |"
             print(row, flush=True)
+            whole.append(f"{100.0 * np.sqrt(np.mean(np.square(np.concatenate(list(medians.values()))))):.2g} ({status})")
+        summary.append(f"| {name} | {' | '.join(whole)} |")
+    print("\n".join(summary))
 
 
 def main(arguments: Sequence[str]) -> None:
