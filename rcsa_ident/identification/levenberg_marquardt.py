@@ -101,7 +101,7 @@ def refine(
         gained = here.cost - trial.cost
         theta = theta + step
         damping = max(0.2 * damping, 1e-8)
-        here = misfit.evaluate(theta, layout, trial.nuisance, grid, normal=True)
+        here = misfit.linearised(trial, theta, layout)
         quiet = quiet + 1 if gained < tolerance * here.cost else 0
         if quiet == 2:
             return Solution(theta, layout, here, True, step_number + 1)

@@ -59,7 +59,7 @@ class Linearisation:
     Parameters
     ----------
     layout : Unknowns
-    jacobians : tuple of arrays, shape (2 n, q + c)
+    jacobians : tuple of arrays, shape (q + c, 2 n)
         Change of each axis' lines with its own parameters, the joint's and the coefficients'.
     columns : tuple of complex arrays, shape (n, 2)
         The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
@@ -77,8 +77,8 @@ class Linearisation:
         Normal equations of each cut's delay and angle.
     mixed : array, shape (k, 2, p)
         What couples them to the parameters.
-    compliance : tuple of complex arrays, shape (n, o, 3)
-        Change of each axis' model with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
+    compliance : tuple of complex arrays, shape (n o, 3)
+        Change of each axis' residual, as complex numbers, with the flange's receptance tt, tr, rr, for what may be added to it.
     """
 
     layout: Unknowns
@@ -104,7 +104,7 @@ class Linearisation:
         lines = []
         for i, (jacobian, columns, cut) in enumerate(zip(self.jacobians, self.columns, self.cut, strict=True)):
             turned = columns[:, 0] * cuts[cut, 0] + columns[:, 1] * cuts[cut, 1]
-            change = jacobian @ np.concatenate([step[self.layout.axis(i)], shared])
+            change = np.concatenate([step[self.layout.axis(i)], shared]) @ jacobian
             lines.append(change + np.concatenate([turned.real, turned.imag]))
         prior = self.cut_prior * cuts
         prior[:, 0] += self.clamping[1] * step[self.clamping[0]]
@@ -115,7 +115,7 @@ class Linearisation:
         slope = self.own.T @ residual.own
         right = self.cut_prior * residual.cuts
         for i, (jacobian, columns, cut, r) in enumerate(zip(self.jacobians, self.columns, self.cut, residual.lines, strict=True)):
-            down = jacobian.T @ r
+            down = jacobian @ r
             block = self.layout.axis(i)
             size = block.stop - block.start
             slope[block] += down[:size]
@@ -156,7 +156,7 @@ class Linearisation:
             groups = changes.reshape(2 * n, -1, together)
             own += np.einsum("nki,nkj->kij", groups, groups, optimize=True)
             block = self.layout.axis(i)
-            products = self.jacobians[i].T @ changes
+            products = self.jacobians[i] @ changes
             mixed[block] += products[: block.stop - block.start]
             mixed[self._shared] += products[block.stop - block.start :]
         solved = np.linalg.solve(self.inner, turned)
