@@ -208,6 +208,24 @@ def whiten(gradient, extra, weight, chain, out):
 
 
 @numba.njit(cache=True, error_model="numpy")
+def force_rows(slope, lines, out):
+    """Fill `out` (c, 2 n o) with the lines' change with each unknown of the force: real parts, then imaginary parts of lines slope.
+
+    Parameters
+    ----------
+    slope : (n, c) complex, change of the force's logarithm; lines : (n, o) complex
+    """
+    n, outputs = lines.shape
+    for c in range(slope.shape[1]):
+        row = out[c]
+        for f in range(n):
+            for o in range(outputs):
+                value = lines[f, o] * slope[f, c]
+                row[f * outputs + o] = value.real
+                row[(n + f) * outputs + o] = value.imag
+
+
+@numba.njit(cache=True, error_model="numpy")
 def mix_cuts(jacobian, columns, cut, own, first, tail, inner, mixed):
     """Add the lines of one axis to the cuts' own matrices `inner` (k, 2, 2) and `mixed` (k, 2, p).
 
@@ -236,6 +254,20 @@ def mix_cuts(jacobian, columns, cut, own, first, tail, inner, mixed):
                 f += 1
             mixed[k, 0, place] += delay
             mixed[k, 1, place] += angle
+
+
+@numba.njit(cache=True, error_model="numpy")
+def sum_cuts(columns, cut, rest, sums):
+    """Add to `sums` (k, 2) what the lines of each cut say of its delay and angle.
+
+    Parameters
+    ----------
+    columns : (n, 2) complex, as in `mix_cuts`; cut : (n,); rest : (2 n,) residual, real and then imaginary parts
+    """
+    n = cut.size
+    for f in range(n):
+        for i in range(2):
+            sums[cut[f], i] += columns[f, i].real * rest[f] + columns[f, i].imag * rest[n + f]
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})

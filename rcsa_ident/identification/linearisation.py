@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification._kernels import sum_cuts
 from rcsa_ident.identification.parameters import Unknowns
 
 #: Unit of a delay in the normal equations [s].
@@ -120,10 +121,9 @@ class Linearisation:
             size = block.stop - block.start
             slope[block] += down[:size]
             slope[self._shared] += down[size:]
-            n = cut.size
-            for j in range(2):
-                right[:, j] += np.bincount(cut, columns[:, j].real * r[:n] + columns[:, j].imag * r[n:], minlength=right.shape[0])
-        np.add.at(slope, self.clamping[0], self.clamping[1] * residual.cuts[:, 0])
+            sum_cuts(columns, cut, r, right)
+        if self.layout.clampings:
+            np.add.at(slope, self.clamping[0], self.clamping[1] * residual.cuts[:, 0])
         return slope - np.tensordot(_solve_pairs(self.inner, right), self.mixed, axes=2)
 
     def border(self, rows: Mapping[int, FloatArray], together: int, residual: Residual) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -162,8 +162,7 @@ class Linearisation:
         solved = np.linalg.solve(self.inner, turned)
         right = self.cut_prior * residual.cuts
         for lines, index, r in zip(self.columns, self.cut, residual.lines, strict=True):
-            for j in range(2):
-                right[:, j] += np.bincount(index, lines[:, j].real * r[: index.size] + lines[:, j].imag * r[index.size :], minlength=cuts)
+            sum_cuts(lines, index, r, right)
         gradient -= np.tensordot(right, solved, axes=2)
         shape = (cuts, 2, -1, together)
         own -= np.einsum("cjki,cjkl->kil", turned.reshape(shape), solved.reshape(shape), optimize=True)

@@ -11,7 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.force import ForceTerm
 from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
-from rcsa_ident.identification._kernels import fit_cuts, mix_cuts, turn_lines
+from rcsa_ident.identification._kernels import fit_cuts, force_rows, mix_cuts, turn_lines
 from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
 from rcsa_ident.identification.linearisation import DELAY_UNIT, Linearisation, Residual
 from rcsa_ident.identification.parameters import (
@@ -450,17 +450,16 @@ class _AxisAnswer:
         own, forces, holder = scale.size, self.slope.shape[1], HOLDER if self.toolings else 0
         # first as it changes with the flange's receptance itself
         scale[bare] = 1.0
-        weight = -lines.root.reshape(n, o) * self.factor[:, None]
+        root = -lines.root.reshape(n, o)
         out = np.empty((own + max(forces, holder), 2 * n * o))
-        rows = out[: own + holder]
+        rows, weight = out[: own + holder], root * self.factor[:, None]
         cross_frf_gradient(
             axis.omega_n, axis.factor, axis.softening, self.joint, lines.shares, lines.points, self.kept, weight, scale, rows
         )
         compliance = _complex(out[bare])
         out[bare] = (RESIDUAL_UNIT * residual_turn(axis.residual)).T @ out[bare]
         with_holder = _complex(out[own : own + holder])
-        change = (self.slope[:, None, :] * (self.model * -lines.root.reshape(n, o))[:, :, None]).reshape(n * o, forces).T
-        out[own : own + forces] = np.hstack([change.real, change.imag])
+        force_rows(self.slope, root * self.model, out[own : own + forces])
         for each in self.toolings:
             moved = with_holder.reshape(n, o, holder)[each.points, :, : each.values.shape[1]] @ each.slopes
             place = (each.points[:, None] * o + np.arange(o)).ravel()

@@ -159,6 +159,25 @@ def test_whiten_is_the_chain_rule_in_standard_deviations():
     np.testing.assert_allclose(out, np.vstack([expected.real, expected.imag]).T, rtol=1e-12)
 
 
+def test_force_rows_are_products_of_lines_and_slopes():
+    rng = np.random.default_rng(19)
+    slope, lines = (rng.standard_normal(s) + 1j * rng.standard_normal(s) for s in ((4, 3), (4, 2)))
+    out = np.empty((3, 16))
+    kernels.force_rows(slope, lines, out)
+    expected = (lines[:, :, None] * slope[:, None, :]).reshape(8, 3)
+    np.testing.assert_allclose(out, np.vstack([expected.real, expected.imag]).T, rtol=1e-12)
+
+
+def test_sums_over_cuts():
+    _, columns, cut, *_ = mixing(np.random.default_rng(20))
+    rest, sums = np.random.default_rng(21).standard_normal(18), np.ones((4, 2))
+    kernels.sum_cuts(columns, cut, rest, sums)
+    for k in range(4):
+        mine = cut == k
+        expected = columns[mine].real.T @ rest[:9][mine] + columns[mine].imag.T @ rest[9:][mine]
+        np.testing.assert_allclose(sums[k], 1.0 + expected, rtol=1e-12)
+
+
 def mixing(rng, n=9, cuts=4, own=3, tail=7, shared=2, size=10):
     """Arguments of `mix_cuts`; one cut has no line."""
     jacobian = rng.standard_normal((own + shared, 2 * n))
@@ -180,7 +199,7 @@ def test_mix_cuts_are_the_blocks_of_the_normal_matrix():
         np.testing.assert_allclose(mixed[k] - before[1][k], stacked[mine].T @ whole[mine], atol=1e-12)
 
 
-NAMES = ["modal_cross_frf", "fit_cuts", "best_grid_misfit", "turn_lines", "whiten", "mix_cuts"]
+NAMES = ["modal_cross_frf", "fit_cuts", "best_grid_misfit", "turn_lines", "whiten", "force_rows", "mix_cuts", "sum_cuts"]
 
 
 def test_every_kernel_is_run_both_ways():
@@ -224,6 +243,16 @@ def test_compiled_and_plain_agree(name, monkeypatch):
             out = np.empty((7, 12))
             function(gradient, extra, rng.uniform(1.0, 9.0, 6), rng.standard_normal(5), out)
             results.append(out)
+        elif name == "force_rows":
+            slope, lines = (rng.standard_normal(s) + 1j * rng.standard_normal(s) for s in ((4, 3), (4, 2)))
+            out = np.empty((3, 16))
+            function(slope, lines, out)
+            results.append(out)
+        elif name == "sum_cuts":
+            _, columns, cut, *_ = mixing(rng)
+            sums = np.zeros((4, 2))
+            function(columns, cut, rng.standard_normal(18), sums)
+            results.append(sums)
         elif name == "mix_cuts":
             arguments = mixing(rng)
             function(*arguments)
