@@ -124,7 +124,10 @@ def fit_jointly(
     found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
     if data.speed_changes:
         with_softening = _start(data, found.candidate, True)
-        moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report)
+        moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report, ROUGHLY)
+        # a fine polish gains less than what separates two answers
+        if evidence(moving, other) < evidence(found, misfit) + SAME_ANSWER:
+            moving, other = refine_and_learn_noise(misfit_of, moving.candidate.point, other.model_error, other.cut_weight, report)
         if evidence(moving, other) < evidence(found, misfit):
             found, misfit = moving, other
     return exchange_modes(found, misfit, data.band_hz, report, rounds=2), misfit
@@ -225,7 +228,7 @@ class JointStart:
         joint = np.mean([c.theta[c.layout.joint] for c in chosen], axis=0)
         theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
         rough = Misfit(data.summed(), priors, tuple(max(f, self.coarse) for f in shares), weight)
-        start = refine(rough, theta, layout, best[0].nuisance, 40, grid=32)
+        start = refine(rough, theta, layout, best[0].nuisance, 40, grid=32, tolerance=ROUGHLY)
         return refine(Misfit(data, priors, shares, weight), *_start(data, start.candidate, False), 60).candidate
 
 
