@@ -19,7 +19,6 @@ from rcsa_ident.identification.coupled.score import STRIKES, Coupling, coupling
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
 from rcsa_ident.identification.joint_fit import (
-    ROUGHLY,
     AxisSearch,
     axis_search,
     first_starts,
@@ -334,7 +333,7 @@ class SearchAxis:
         refined = []
         for theta, layout, nuisance in self._starts(band, report):
             theta = np.concatenate([theta, force])
-            refined.append(refine(misfit, theta, Layout((layout,), force.size), nuisance, 60, grid=32, tolerance=ROUGHLY))
+            refined.append(refine(misfit, theta, Layout((layout,), force.size), nuisance, 60, grid=32))
             report(Stage.REFINE, refined[-1].cost, refined[-1])
         refined = sorted((s for s in refined if np.isfinite(s.cost)), key=lambda s: s.cost)
         if not refined:
@@ -396,7 +395,7 @@ class SearchFromOtherAxis:
         report = _report_to(str(data.axes[0].axis), trace, self.progress)
         rough = Misfit(data, method.priors, (method.coarse[1],))
         misfit = Misfit(data, method.priors, (own.model_error,), own.cut_weight)
-        found = refine(rough, *self.other.candidates[0].point, 60, grid=32, tolerance=ROUGHLY)
+        found = refine(rough, *self.other.candidates[0].point, 60, grid=32)
         found = drop_modes(refine(misfit, found.theta, found.layout, found.evaluation.nuisance, 100), misfit, give_up=GIVE_UP_SOON)
         report(Stage.OTHER_AXIS, found.cost, found)
         return own.joined(axis_search(found, misfit, trace))

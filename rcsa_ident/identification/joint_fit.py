@@ -228,7 +228,7 @@ class JointStart:
         joint = np.mean([c.theta[c.layout.joint] for c in chosen], axis=0)
         theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
         rough = Misfit(data.summed(), priors, tuple(max(f, self.coarse) for f in shares), weight)
-        start = refine(rough, theta, layout, best[0].nuisance, 40, grid=32, tolerance=ROUGHLY)
+        start = refine(rough, theta, layout, best[0].nuisance, 40, grid=32)
         return refine(Misfit(data, priors, shares, weight), *_start(data, start.candidate, False), 60).candidate
 
 
