@@ -53,8 +53,8 @@ def rod_structure(assembly: ToolAssembly, twisting: bool = False) -> Structure:
     d = len(set(numbers.values()))
     mass, damping, stiffness, loss = (np.zeros((d, d)) for _ in range(4))
     for body, start, segment in pieces:
-        inside = edges[(edges > start - 1e-10) & (edges < start + segment.length + 1e-10)]
-        for a, b in pairwise(inside.tolist()):
+        first, last = _key(start), _key(start + segment.length)
+        for a, b in pairwise(z for z in edges.tolist() if first <= _key(z) <= last):
             rigidity, inertia = _section(segment.part(a - start, b - start), twisting)
             pair = np.ix_(*2 * ([numbers[body, _key(a)], numbers[body, _key(b)]],))
             stiffness[pair] += rigidity / (b - a) * _STIFFNESS
@@ -63,13 +63,12 @@ def rod_structure(assembly: ToolAssembly, twisting: bool = False) -> Structure:
     if layered:
         assert assembly.contact is not None
         arm = 0.25 * assembly.tool[-1].diameter ** 2 if twisting else 1.0
-        held = edges[(edges > assembly.stickout - 1e-10) & (edges < assembly.tool_length + 1e-10)]
+        held = np.array([z for z in edges.tolist() if _key(assembly.stickout) <= _key(z) <= _key(assembly.tool_length)])
         for z, share in zip(held.tolist(), _shares(held).tolist(), strict=True):
             pair = np.ix_(*2 * ([numbers[0, _key(z)], numbers[1, _key(z)]],))
             stiffness[pair] += arm * share * assembly.contact.translational_stiffness * _STIFFNESS
             damping[pair] += arm * share * assembly.contact.translational_damping * _STIFFNESS
-    last = numbers[1, _key(edges[-1])]
-    ends = ((), ()) if twisting else (ENDS, (numbers[0, 0], last))
+    ends = ((), ()) if twisting else (ENDS, (numbers[0, 0], numbers[1, _key(edges[-1])]))
     return Structure(mass, damping, stiffness, loss, ends[0], np.array(ends[1], dtype=np.intp))
 
 
@@ -108,7 +107,7 @@ def _numbers(edges: FloatArray, assembly: ToolAssembly, layered: bool) -> dict[t
     found: dict[tuple[int, int], int] = {}
     number = 0
     for z in edges.tolist():
-        of_tool, of_holder = z < assembly.tool_length + 1e-10, z > assembly.stickout - 1e-10
+        of_tool, of_holder = _key(z) <= _key(assembly.tool_length), _key(z) >= _key(assembly.stickout)
         if of_tool:
             found[0, _key(z)] = number
         if of_holder:
