@@ -193,9 +193,11 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder,
                 row[k] = -y0 * x0
                 row[k + 1] = -y0 * x1 - y1 * x0
                 row[k + 2] = -y1 * x1
-                row[k + 3] = y0 - (1.0 - own) * x0
-                row[k + 4] = y1 - (1.0 - own) * x1
-                row[k + 5] = 1.0 - own
+                # the first output alone holds the tool-holder's own motion
+                away = 1.0 - own if o == 0 else 0.0
+                row[k + 3] = y0 - away * x0
+                row[k + 4] = y1 - away * x1
+                row[k + 5] = away
 
 
 @numba.njit(cache=True, error_model="numpy")

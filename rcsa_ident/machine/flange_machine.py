@@ -77,7 +77,7 @@ class FlangeMachine(Machine):
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        """What speaks against everything that is computed with it: frequencies of a measurement that lie too far apart."""
+        """What speaks against everything that is computed with it: frequencies that lie too far apart, an axis that feeds energy in."""
         found: list[str] = []
         for flange in self.flanges:
             if isinstance(flange, MeasuredFlange):

@@ -35,7 +35,7 @@ _LOOKS = 6
 #: Steps of Newton's method for a crossing.
 _NEWTON = 15
 #: Delays whose phases differ by more stand apart [rad]; a polynomial of so many nodes, and more with the phase, is exact to 1e-10.
-_APART, _DEGREE = 1.0, 10
+_APART, _DEGREE = 1.0, 14
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -192,6 +192,39 @@ def test_cross_frf_gradient_against_differences(measured, soft, stands):
             assert np.abs(gradient[:, o, k] - difference[:, o]).max() < 1e-5 * size, (k, o)
 
 
+@pytest.mark.parametrize("measured", MEASURED)
+def test_cross_frf_gradient_of_the_tool_holder(measured):
+    """The lines move with the tool-holder's own receptances as differences say; a hammer finds the tip in the first output alone."""
+    rng = np.random.default_rng(7)
+    omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 11)
+    _, flange, tip = substructure(rng, omega)
+    shares = MEASURED[measured]
+    omega_n, psi, factor, softening, residual, joint = candidate(rng, 3, False, max(shares.shape[1] - 1, 1))
+    shapes = np.vstack([psi, residual.T])[:, : 1 + shares.shape[1]].copy()
+    away = 1.0 - hit(omega)[0]
+    points = np.column_stack([omega, np.zeros(11), 1.0 - away, np.zeros(11)])
+    size = 9 + 6 + 3 + 5 * (shares.shape[1] - 1) + 4
+
+    def at(change, rows):
+        holder = np.column_stack([flange, tip, away * 1e-8, -away * tip[:, 0], -away * tip[:, 1]]).astype(complex)
+        holder[:, :5] += change[:, :5]
+        holder[:, 5] += away * change[:, 5]
+        holder[:, 6:] -= away[:, None] * change[:, 3:5]
+        values = np.empty((11, shares.shape[0]), dtype=complex)
+        kernels.cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder, values, rows)
+        return values
+
+    gradient = np.empty((11, shares.shape[0], size + 6), dtype=complex)
+    at(np.zeros((11, 6)), gradient)
+    sizes = np.concatenate([np.abs(flange).mean(axis=0), np.abs(tip).mean(axis=0), [1e-8]])
+    for k, step in enumerate(1e-5 * sizes):
+        change = np.zeros((11, 6))
+        change[:, k] = step
+        none = np.empty((0, shares.shape[0], 0), dtype=complex)
+        difference = (at(change, none) - at(-change, none)) / (2.0 * step)
+        np.testing.assert_allclose(gradient[:, :, size + k], difference, rtol=1e-5, atol=1e-6 * np.abs(difference).max() + 1e-12)
+
+
 @pytest.mark.slow
 def test_modal_cross_frf_is_that_of_coupled_modes():
     rng = np.random.default_rng(6)

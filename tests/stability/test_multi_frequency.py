@@ -320,7 +320,7 @@ def test_process_damping_agrees_with_a_march_through_time(rpm):
 
 
 @pytest.mark.parametrize(
-    ("delays", "most"), [(np.linspace(1.5, 1.6, 80), 25), (np.r_[np.linspace(1.4, 1.5, 50), np.linspace(1.7, 1.8, 50)], 50)]
+    ("delays", "most"), [(np.linspace(1.5, 1.6, 80), 30), (np.r_[np.linspace(1.4, 1.5, 50), np.linspace(1.7, 1.8, 50)], 60)]
 )
 def test_fewer_delays_act_as_many(delays, most):
     """Teeth with a helix of their own have as many delays as nodes: phases of all frequencies up to the highest stay what they are."""
@@ -330,7 +330,7 @@ def test_fewer_delays_act_as_many(delays, most):
     assert fewer.size < most
     for order in (0.0, 33.3, -120.0):
         wanted = np.tensordot(np.exp(-1j * order * delays), acting, axes=1)
-        np.testing.assert_allclose(np.tensordot(np.exp(-1j * order * fewer), grouped, axes=1), wanted, atol=1e-9 * np.abs(acting).sum())
+        np.testing.assert_allclose(np.tensordot(np.exp(-1j * order * fewer), grouped, axes=1), wanted, atol=1e-10 * np.abs(acting).sum())
 
 
 def test_few_delays_stay_what_they_are():
