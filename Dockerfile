@@ -9,6 +9,7 @@ COPY .ci/constraints.txt ./.ci/constraints.txt
 COPY rcsa_ident ./rcsa_ident
 COPY api ./api
 COPY data/machines ./data/machines
+COPY data/robots ./data/robots
 # the same versions as in CI, those that build the package included
 RUN python -m venv /opt/rcsa-ident \
     && PIP_CONSTRAINT=.ci/constraints.txt PIP_BUILD_CONSTRAINT=.ci/constraints.txt \

@@ -187,6 +187,9 @@ AXIAL_RATIO = Range("", 1.0, (-1.0, 1.5), (-1.0, 5.0), (("was it given in percen
 EDGE = Range("N/mm", 1e3, (0.0, 200.0), (0.0, 1000.0), (("was it given in N/m ({})?", 1e-3),))
 FEED_PER_TOOTH = Range("mm", 1e-3, (0.001, 2.0), (1e-5, 10.0), (("was it given in metres ({})?", 1e3), ("was it given in µm ({})?", 1e-3)))
 IMMERSION = Range("%", 1e-2, (1.5, 100.0), (0.0, 100.0), (("was {} meant?", 1e2),))
+JOINT_STIFFNESS = Range(
+    "N m/rad", 1.0, (1e4, 1e8), (1e2, 1e10), (("was it given in N m/° ({})?", 180.0 / math.pi), ("was it given in kN m/rad ({})?", 1e3))
+)
 SPINDLE_SPEED = Range("rev/min", from_rpm(1.0), (150.0, 80_000.0), (1.0, 500_000.0))
 #: Least and largest change of the speed within a pass, as a share of its first.
 LEAST_SWEEP, LARGEST_SWEEP = 0.005, 2.0

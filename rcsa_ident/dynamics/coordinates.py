@@ -12,7 +12,8 @@ class Dof(StrEnum):
     """A direction of motion.
 
     `SLOPE_X` is the rotation of the cross-section in the X bending plane, positive as dx/dz with z from the tip
-    towards the spindle; a moment in its direction is its work conjugate. `SLOPE_Y` likewise.
+    towards the spindle; a moment in its direction is its work conjugate. `SLOPE_Y` likewise. Of a right-handed turn
+    (theta_x, theta_y, theta_z) they are theta_y and -theta_x; `TORSION` is theta_z.
     """
 
     X = "x"
@@ -20,11 +21,12 @@ class Dof(StrEnum):
     Z = "z"
     SLOPE_X = "x'"
     SLOPE_Y = "y'"
+    TORSION = "z'"
 
     @property
     def is_slope(self) -> bool:
         """True for a rotation."""
-        return self in (Dof.SLOPE_X, Dof.SLOPE_Y)
+        return self in (Dof.SLOPE_X, Dof.SLOPE_Y, Dof.TORSION)
 
     @property
     def plane(self) -> Dof:

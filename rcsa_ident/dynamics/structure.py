@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg
@@ -26,7 +26,9 @@ class Structure:
         SI; `structural_damping` S is the imaginary part of the stiffness (material loss factors, hysteretic).
     coordinates : tuple of Coordinate, length p
     index : array of int, shape (p,)
-        The degree of freedom that each coordinate is.
+        The degree of freedom that each coordinate is; empty where `shapes` are given.
+    shapes : array, shape (d, p), optional
+        How each coordinate moves with every degree of freedom, where coordinates are none of these themselves.
     """
 
     mass: FloatArray
@@ -34,7 +36,8 @@ class Structure:
     stiffness: FloatArray
     structural_damping: FloatArray
     coordinates: tuple[Coordinate, ...]
-    index: np.ndarray
+    index: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    shapes: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness", "structural_damping"):
@@ -43,8 +46,22 @@ class Structure:
                 raise InputError(name, matrix.shape, "a square matrix of the mass matrix's shape")
             object.__setattr__(self, name, matrix)
         object.__setattr__(self, "index", frozen(self.index, np.intp))
-        if len(self.coordinates) != self.index.size:
+        if self.shapes is not None:
+            shape = (self.mass.shape[0], len(self.coordinates))
+            object.__setattr__(self, "shapes", frozen(self.shapes))
+            if self.shapes.shape != shape or self.index.size:
+                raise InputError("shapes", self.shapes.shape, f"shape {shape}: degrees of freedom, coordinates; and no index beside them")
+        elif len(self.coordinates) != self.index.size:
             raise InputError("coordinates", len(self.coordinates), f"{self.index.size}, one for each index")
+
+    @property
+    def ports(self) -> FloatArray:
+        """How each coordinate moves with every degree of freedom, shape (d, p)."""
+        if self.shapes is not None:
+            return self.shapes
+        ports = np.zeros((self.mass.shape[0], self.index.size))
+        ports[self.index, np.arange(self.index.size)] = 1.0
+        return ports
 
     def receptance(self, omega: FloatArray) -> Receptance:
         """Return the receptance between all coordinates, by one solution of the full equations per frequency.
@@ -52,8 +69,9 @@ class Structure:
         The exact and slow way; `poles` is the fast one.
         """
         omega = frozen(omega)
-        values = np.array([x[self.index] for x in unit_responses(self, omega)])
-        return Receptance(omega, values.reshape(omega.size, *2 * (self.index.size,)), self.coordinates, self.coordinates)
+        ports = self.ports
+        values = np.array([ports.T @ x for x in unit_responses(self, omega)])
+        return Receptance(omega, values.reshape(omega.size, *2 * (ports.shape[1],)), self.coordinates, self.coordinates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +111,7 @@ def unit_responses(structure: Structure, omega: FloatArray) -> Iterator[ComplexA
 
 
 def _unit_responses(structure: Structure, bands: _Bands, omega: FloatArray) -> Iterator[ComplexArray]:
-    force = np.zeros((structure.mass.shape[0], structure.index.size), dtype=complex)
-    force[structure.index, np.arange(structure.index.size)] = 1.0
+    force = structure.ports.astype(complex)
     for w in omega:
         dynamic = bands.stiffness + 1j * w * bands.damping - w**2 * bands.mass
         yield scipy.linalg.solve_banded((bands.half, bands.half), dynamic, force, overwrite_ab=True, check_finite=False)
@@ -157,8 +174,8 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
     rigid = _rigid_body_modes(bands, max_omega)
     basis = _elastic_basis(_snapshots(structure, [bands], max_omega, snapshots), bands, rigid, tolerance)
     mass, damping, stiffness = (basis.T @ bands.times(band, basis) for band in (bands.mass.real, bands.damping.real, bands.stiffness))
-    elastic = _diagonalise(mass, damping, stiffness, basis[structure.index], structure.coordinates)
-    small, at_ports = 1e-7j * max_omega, rigid[structure.index]
+    elastic = _diagonalise(mass, damping, stiffness, structure.ports.T @ basis, structure.coordinates)
+    small, at_ports = 1e-7j * max_omega, structure.ports.T @ rigid
     pair = np.concatenate([np.full(rigid.shape[1], small), np.full(rigid.shape[1], -small)])
     return PoleModel(
         np.concatenate([elastic.pole, pair]),

@@ -1,0 +1,1 @@
+"""A robot behind the flange: a machine with a posture."""

@@ -1,0 +1,59 @@
+"""How far a robot gives way under a force that stands still, and what its joints' springs answer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.machine.robot.inertia import gravity_torques
+from rcsa_ident.machine.robot.kinematics import posed
+from rcsa_ident.machine.robot.model import RobotModel
+
+
+def static_compliance(robot: RobotModel, angles: FloatArray, tilts: bool = True) -> FloatArray:
+    """Return J K^-1 J^T at the tool's place, in the base's axes, shape (6, 6) [m/N, rad/N, m/(N m), rad/(N m)].
+
+    Parameters
+    ----------
+    robot : RobotModel
+    angles : array, shape (j,) [rad]
+        Of the joints.
+    tilts : bool
+        With the springs across the joints' axes.
+    """
+    chain = posed(robot, angles, tilts)
+    motion = chain.jacobian(chain.flange.point(robot.tool_point.offset))
+    return (motion / chain.chain.stiffness) @ motion.T
+
+
+def sag(robot: RobotModel, angles: FloatArray, tilts: bool = True, payload: bool = True) -> FloatArray:
+    """Return how far the tool's place sinks under the arm's weight, translations and rotations in the base's axes, shape (6,) [m, rad].
+
+    To first order in the angles, with what the control takes out left out; springs across the axes are never taken out.
+    """
+    chain = posed(robot, angles, tilts, payload)
+    bent = -gravity_torques(robot, _all(robot, angles, tilts), tilts, payload) / chain.chain.stiffness
+    bent[chain.chain.driven[[j.gravity_compensated for j in robot.joints]]] = 0.0
+    return chain.jacobian(chain.flange.point(robot.tool_point.offset)) @ bent
+
+
+def spring_torques(robot: RobotModel, twist: FloatArray, rate: FloatArray, tilts: bool = True) -> FloatArray:
+    """Return the torques of all springs and dampers on the links, shape (n,) [N m].
+
+    Parameters
+    ----------
+    robot : RobotModel
+    twist : array, shape (n,) [rad]
+        How far each freedom stands from where its drive holds it; within the play on both sides a drive's spring feels nothing.
+    rate : array, shape (n,) [rad/s]
+    tilts : bool
+    """
+    chain = robot.chain(tilts)
+    play = np.zeros(chain.mass.size)
+    play[chain.driven] = [j.backlash for j in robot.joints]
+    felt = np.sign(twist) * np.maximum(np.abs(twist) - play, 0.0)
+    return frozen(-chain.stiffness * felt - chain.damping * np.asarray(rate, dtype=float))
+
+
+def _all(robot: RobotModel, angles: FloatArray, tilts: bool) -> FloatArray:
+    return robot.chain(tilts).angles(robot.posture(angles))
