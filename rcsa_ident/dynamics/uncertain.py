@@ -133,13 +133,17 @@ class UncertainReceptance(Receptance):
         return self.variation is not None and self.variation.covers >= set(np.flatnonzero(np.any(self.values, axis=(0, 2))).tolist())
 
     def among(self, coordinates: Sequence[Coordinate]) -> UncertainReceptance:
-        """Return the same over further coordinates, its own among them; those that it does not have are rigid."""
+        """Return the same over other coordinates: those that it does not have are rigid, those that are not wanted are left away."""
         wanted = tuple(coordinates)
-        own = [wanted.index(c) for c in self.rows]
+        kept = [k for k, c in enumerate(self.rows) if c in wanted]
+        own = np.array([wanted.index(self.rows[k]) for k in kept], dtype=np.intp)
         values = np.zeros((self.omega.size, len(wanted), len(wanted)), dtype=complex)
-        values[:, np.array(own)[:, None], own] = self.values
-        variation = None if self.variation is None else _Among(self.variation, tuple(own))
-        poles = None if self.poles is None else partial(_projected, self.poles, np.eye(len(wanted))[:, own])
+        values[:, own[:, None], own] = self.values[:, kept][:, :, kept]
+        places = dict(zip(kept, own.tolist(), strict=True))
+        variation = None if self.variation is None else _Among(self.variation, places)
+        turn = np.zeros((len(wanted), len(self.rows)))
+        turn[own, kept] = 1.0
+        poles = None if self.poles is None else partial(_projected, self.poles, turn)
         return UncertainReceptance(self.omega, values, wanted, wanted, variation, poles)
 
     def thinned(self) -> UncertainReceptance:
@@ -185,17 +189,22 @@ def _projected(poles: Callable[[], PoleResidue | None], turn: FloatArray) -> Pol
 
 @dataclass(frozen=True, slots=True)
 class _Among:
-    """A spread whose rows stand among others."""
+    """A spread some of whose rows stand among others, by their places there."""
 
     whole: Spread
-    own: tuple[int, ...]
+    places: Mapping[int, int]
 
     @property
     def covers(self) -> frozenset[int]:
-        return frozenset(self.own[row] for row in self.whole.covers)
+        return frozenset(self.places[row] for row in self.whole.covers if row in self.places)
 
     def at(self, places: Places) -> tuple[Variation, ...]:
-        return tuple(replace(each, members=tuple(self.own[m] for m in each.members)) for each in self.whole.at(places))
+        return tuple(self._moved(each) for each in self.whole.at(places))
+
+    def _moved(self, variation: Variation) -> Variation:
+        kept = [k for k, m in enumerate(variation.members) if m in self.places]
+        members = tuple(self.places[variation.members[k]] for k in kept)
+        return replace(variation, members=members, change=variation.change[:, :, kept][:, :, :, kept])
 
     def guides(self) -> ComplexArray:
         return self.whole.guides()

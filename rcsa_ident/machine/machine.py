@@ -175,12 +175,13 @@ class Machine(TipSource, Drawn):
     @property
     def axes(self) -> tuple[Dof, ...]:
         """Machine axes of the bending planes, along which the tip moves."""
-        return tuple(c.dof for c in self.coordinates if not c.dof.is_slope)
+        return tuple(c.dof for c in self.coordinates if c.dof in (Dof.X, Dof.Y))
 
     @property
     def translations(self) -> tuple[Coordinate, ...]:
-        """Axes along which the tip is known to move: X, Y, and Z after an axial tap."""
-        return (*(Coordinate("tip", axis) for axis in self.axes), *(() if self.axial is None else (AXIAL_TIP,)))
+        """Axes along which the tip is known to move: X, Y, and Z after an axial tap or on a robot."""
+        along = self.axial is not None or any(c.dof is Dof.Z for c in self.coordinates)
+        return (*(Coordinate("tip", axis) for axis in self.axes), *((AXIAL_TIP,) if along else ()))
 
     def lines(self, beyond: float = 1.0) -> FloatArray:
         """Return frequencies [rad/s] 1 Hz apart, from 100 Hz or below up to so many times the highest at which the machine is known."""
@@ -277,7 +278,7 @@ class Machine(TipSource, Drawn):
         if len(sides) == 1:
             highest = float(tip.omega[-1])
             tip = replace(tip, poles=partial(poles_of, drawing.assembly, sides[0].part.believed, highest, turning, slopes))
-        if set(directions) > set(TIP):
+        if set(directions) > set(TIP) or (set(directions) == set(TIP) < set(tip.rows)):
             tip = tip.among(directions)
         return tip if spread else replace(tip, variation=None)
 

@@ -6,26 +6,35 @@ their flanges. The poles of the whole at a spindle speed cost a small eigenvalue
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.turning_modes import TurningModes, gyroscopic_poles
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.rods import ReducedRod, reduced_rod
 from rcsa_ident.tool_holder.turning import TurningToolHolder, turning_tool_holder
 
-#: Directions of the flange, X plane and Y plane.
+#: Directions of the flange, X plane and Y plane; and all six, with those that a tool-holder feels as a rod.
 FLANGE = (*plane("flange", Dof.X), *plane("flange", Dof.Y))
+WHOLE_FLANGE = (*FLANGE, Coordinate("flange", Dof.Z), Coordinate("flange", Dof.TORSION))
 #: Poles beyond so many times the tool-holder's highest frequency are a residual compliance.
 BEYOND = 2.0
 
 
 def synthesised_poles(
-    holder: TurningToolHolder, flange: TurningModes, joint: LumpedJoint | None, turning: float | None, slopes: bool = False
+    holder: TurningToolHolder,
+    flange: TurningModes,
+    joint: LumpedJoint | None,
+    turning: float | None,
+    slopes: bool = False,
+    rods: Sequence[ReducedRod] = (),
 ) -> PoleResidue | None:
     """Return the tip's receptance of a tool-holder on a machine as poles, or None where joint and residual hold rigidly.
 
@@ -33,12 +42,14 @@ def synthesised_poles(
     ----------
     holder : TurningToolHolder
     flange : TurningModes
-        Over translation and slope of the flange in X, then in Y.
+        Over translation and slope of the flange in X, then in Y; then along its axis and about it, as far as there are rods.
     joint : LumpedJoint or None
     turning : float or None [rad/s]
         Spindle speed of the tool-holder's gyroscopic moments; None leaves them out.
     slopes : bool
         Over translation and slope of each plane, instead of both translations.
+    rods : sequence of ReducedRod, default none
+        The tool-holder along its axis, and about it; with the first the tip moves along the axis, too.
 
     Notes
     -----
@@ -51,24 +62,33 @@ def synthesised_poles(
         return None
     spring, damper = between
     h, m = len(holder.damping), flange.omega_n.size
-    n = 2 * h + m
+    n = 2 * h + sum(len(rod.damping) for rod in rods) + m
     planes = (slice(0, h), slice(h, 2 * h))
     stiffness, damping, loss, moments = (np.zeros((n, n)) for _ in range(4))
     seen = 2 if slopes else 1
-    gap, tip = np.zeros((4, n)), np.zeros((2 * seen, n))
+    moved = 2 * seen + min(len(rods), 1)
+    gap, tip = np.zeros((4 + len(rods), n)), np.zeros((moved, n))
     for k, own in enumerate(planes):
         stiffness[own, own], loss[own, own], damping[own, own] = holder.stiffness.real, holder.stiffness.imag, holder.damping
         gap[2 * k : 2 * k + 2, own] = holder.ports[2:]
         tip[seen * k : seen * (k + 1), own] = holder.ports[:seen]
     across = 0.0 if turning is None else 2.0 * turning
     moments[planes[0], planes[1]], moments[planes[1], planes[0]] = -across * holder.rotary, across * holder.rotary
-    own = slice(2 * h, n)
+    first = 2 * h
+    for k, rod in enumerate(rods):
+        own = slice(first, first + len(rod.damping))
+        stiffness[own, own], loss[own, own], damping[own, own] = rod.stiffness.real, rod.stiffness.imag, rod.damping
+        gap[4 + k, own] = rod.ports[1]
+        if k == 0:
+            tip[-1, own] = rod.ports[0]
+        first = own.stop
+    own = slice(first, n)
     stiffness[own, own], damping[own, own], moments[own, own] = flange.stiffness, flange.damping, flange.speed * flange.gyroscopic
     gap[:, own] = -flange.psi.T
     squares, shapes = scipy.linalg.eigh(stiffness + gap.T @ spring @ gap)
     natural = np.sqrt(squares)
     viscous = shapes.T @ (damping + gap.T @ damper @ gap) @ shapes + shapes.T @ loss @ shapes / np.sqrt(np.outer(natural, natural))
-    poles = gyroscopic_poles(natural, viscous, shapes.T @ moments @ shapes, (tip @ shapes).T, np.zeros((2 * seen, 2 * seen)))
+    poles = gyroscopic_poles(natural, viscous, shapes.T @ moments @ shapes, (tip @ shapes).T, np.zeros((moved, moved)))
     return _within(poles, BEYOND * holder.highest)
 
 
@@ -81,7 +101,7 @@ def poles_of(
     ----------
     assembly : ToolAssembly
     believed : JointedFlange
-        Of both bending planes.
+        Of both bending planes, or of all six directions.
     highest : float [rad/s]
         Up to which the tip is asked for.
     turning : float or None [rad/s]
@@ -90,19 +110,21 @@ def poles_of(
         As in `synthesised_poles`.
     """
     flange = believed.flange
-    if not isinstance(flange, TurningModes) or flange.coordinates != FLANGE:
+    if not isinstance(flange, TurningModes) or flange.coordinates not in (FLANGE, WHOLE_FLANGE):
         return None
     holder = turning_tool_holder(assembly, highest, 0.0 if turning is None else turning)
-    return synthesised_poles(holder, flange, believed.joint, turning, slopes)
+    rods = [reduced_rod(assembly, highest, twisting) for twisting in (False, True)] if flange.coordinates == WHOLE_FLANGE else []
+    return synthesised_poles(holder, flange, believed.joint, turning, slopes, rods)
 
 
 def _spring(flange: TurningModes, joint: LumpedJoint | None) -> tuple[FloatArray, FloatArray] | None:
-    """Stiffness and damping of joint and residual compliance behind each other, shape (4, 4) each; None where they are rigid."""
-    compliance, lag = np.array(flange.residual), np.zeros(4)
+    """Stiffness and damping of joint and residual compliance behind each other, shape (d, d) each; None where they are rigid."""
+    d = len(flange.coordinates)
+    compliance, lag = np.array(flange.residual), np.zeros(d)
     if joint is not None:
-        stiffness = np.array([joint.translational_stiffness, joint.rotational_stiffness] * 2)
-        compliance[np.arange(4), np.arange(4)] += 1.0 / stiffness
-        lag = np.array([joint.translational_damping, joint.rotational_damping] * 2) / stiffness**2
+        stiffness = np.array([joint.translational_stiffness, joint.rotational_stiffness] * (d // 2))
+        compliance[np.arange(d), np.arange(d)] += 1.0 / stiffness
+        lag = np.array([joint.translational_damping, joint.rotational_damping] * (d // 2)) / stiffness**2
     scale = np.sqrt(np.diag(compliance))
     if not np.all(scale > 0.0) or np.linalg.cond(compliance / np.outer(scale, scale)) > 1e8:
         return None

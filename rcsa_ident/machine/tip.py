@@ -20,7 +20,7 @@ from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.drawings import FittedDrawing
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_poles
-from rcsa_ident.tool_holder.rods import axial_poles
+from rcsa_ident.tool_holder.rods import rod_poles
 from rcsa_ident.tool_holder.turning import both_planes, entries_at_speed
 
 #: Of a tool-holder's receptances (translation and slope of the tip, then of the flange) those that the tip's translation asks for: tip,
@@ -100,7 +100,8 @@ class Side:
 
     def moves(self, slopes: bool = False) -> tuple[Coordinate, ...]:
         """Return the tip's directions that it moves: translations, with the slopes if asked."""
-        return tuple(Coordinate("tip", c.dof) for c in self.part.coordinates if slopes or not c.dof.is_slope)
+        moved = (c.dof for c in self.part.coordinates if c.dof is not Dof.TORSION)
+        return tuple(Coordinate("tip", dof) for dof in moved if slopes or not dof.is_slope)
 
     def doubted(self) -> Side:
         """Return the same with what is not known of it, without the steps' ends."""
@@ -263,14 +264,13 @@ class Behind:
 
     def _holder(self, side: Side, assembly: ToolAssembly, omega: FloatArray, highest: float) -> Holder | PlaneHolder:
         if side.axial:
-            free = axial_poles(assembly, highest).receptance(omega).values
-            return Holder(_cut(free, 1, 1))
+            return Holder(_rod(assembly, omega, highest))
         if self.turning is not None:
             return _turning_holder(assembly, omega, self.turning, side, self.slopes)
         poles = tool_holder_poles(assembly, highest)
         if side.single and not self.slopes:
             return PlaneHolder.of(poles.entries(omega, _ENTRIES))
-        planes = len(side.part.coordinates) // 2
+        planes = 1 if side.single else 2
         free = poles.entries(omega, _ALL).T.reshape(-1, 4, 4)
         kept = [0, 1, 2, 3] if self.slopes else [0, 2, 3]
         free = free[:, kept][:, :, kept]
@@ -283,7 +283,29 @@ class Behind:
             r, c = block.shape[1:]
             return np.einsum("ab,nij->naibj", unit, block).reshape(n, planes * r, planes * c)
 
-        return Holder((apart(a11), apart(a12), apart(a21), apart(a22)))
+        a11, a12, a21, a22 = apart(a11), apart(a12), apart(a21), apart(a22)
+        for dof in (c.dof for c in side.part.coordinates[2 * planes :]):
+            tips, across, back, own = _rod(assembly, omega, highest, dof is Dof.TORSION)
+            if dof is Dof.TORSION:
+                # what twists the tip is nobody's question
+                tips, across, back = tips[:, :0, :0], across[:, :0], back[:, :, :0]
+            a11, a12, a21, a22 = _beside(a11, tips), _beside(a12, across), _beside(a21, back), _beside(a22, own)
+        return Holder((a11, a12, a21, a22))
+
+
+def _rod(
+    assembly: ToolAssembly, omega: FloatArray, highest: float, twisting: bool = False
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+    """A11, A12, A21, A22 of a tool-holder along its axis, or of its twist."""
+    return _cut(rod_poles(assembly, highest, twisting).receptance(omega).values, 1, 1)
+
+
+def _beside(one: ComplexArray, other: ComplexArray) -> ComplexArray:
+    """Blocks of directions that feel nothing of each other, shapes (n, a, b) and (n, c, d) -> (n, a + c, b + d)."""
+    (n, a, b), (_, c, d) = one.shape, other.shape
+    both = np.zeros((n, a + c, b + d), dtype=complex)
+    both[:, :a, :b], both[:, a:, b:] = one, other
+    return both
 
 
 def _cut(free: ComplexArray, tip: int, flange: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:

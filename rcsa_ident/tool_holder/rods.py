@@ -6,21 +6,24 @@ shank for torsion. A connection without a contact is rigid.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+import scipy.linalg
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import PoleModel
-from rcsa_ident.dynamics.structure import Structure, poles
+from rcsa_ident.dynamics.structure import Structure, poles, projection_basis
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 
 #: Longest element [m].
 ELEMENT = 2e-3
-#: Ends of a rod, in the order of `axial_poles`.
+#: Ends of a rod that stretches, and of one that twists, in the order of `rod_poles`.
 ENDS = (Coordinate("tip", Dof.Z), Coordinate("flange", Dof.Z))
+TWISTING_ENDS = (Coordinate("tip", Dof.TORSION), Coordinate("flange", Dof.TORSION))
 #: Stiffness over E A / L, and mass over rho A L.
 _STIFFNESS = np.array([[1.0, -1.0], [-1.0, 1.0]])
 _MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
@@ -33,7 +36,7 @@ def rod_structure(assembly: ToolAssembly, twisting: bool = False) -> Structure:
     ----------
     assembly : ToolAssembly
     twisting : bool
-        Of rotations about the axis instead, without coordinates; a fluted part twists as the circle of its second moment would.
+        Of rotations about the axis instead; a fluted part twists as the circle of its second moment would.
 
     Examples
     --------
@@ -68,21 +71,56 @@ def rod_structure(assembly: ToolAssembly, twisting: bool = False) -> Structure:
             pair = np.ix_(*2 * ([numbers[0, _key(z)], numbers[1, _key(z)]],))
             stiffness[pair] += arm * share * assembly.contact.translational_stiffness * _STIFFNESS
             damping[pair] += arm * share * assembly.contact.translational_damping * _STIFFNESS
-    ends = ((), ()) if twisting else (ENDS, (numbers[0, 0], numbers[1, _key(edges[-1])]))
-    return Structure(mass, damping, stiffness, loss, ends[0], np.array(ends[1], dtype=np.intp))
+    ends = np.array([numbers[0, 0], numbers[1, _key(edges[-1])]], dtype=np.intp)
+    return Structure(mass, damping, stiffness, loss, TWISTING_ENDS if twisting else ENDS, ends)
 
 
 @lru_cache(maxsize=64)
-def axial_poles(assembly: ToolAssembly, highest: float) -> PoleModel:
-    """Return the poles behind the axial receptances of the free assembly, between tip and flange.
+def rod_poles(assembly: ToolAssembly, highest: float, twisting: bool = False) -> PoleModel:
+    """Return the poles behind the axial receptances of the free assembly, between tip and flange, or behind those of its twist.
 
     Parameters
     ----------
     assembly : ToolAssembly
     highest : float [rad/s]
         Frequency up to which they are good.
+    twisting : bool
     """
-    return poles(rod_structure(assembly), highest)
+    return poles(rod_structure(assembly, twisting), highest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReducedRod:
+    """A free rod in few coordinates whose mass is the identity: its rigid motion, then elastic ones.
+
+    Parameters
+    ----------
+    stiffness : complex array, shape (m, m)
+        With the materials' loss in its imaginary part.
+    damping : array, shape (m, m)
+    ports : array, shape (2, m)
+        Motion of the tip, then of the flange.
+    """
+
+    stiffness: ComplexArray
+    damping: FloatArray
+    ports: FloatArray
+
+
+@lru_cache(maxsize=64)
+def reduced_rod(assembly: ToolAssembly, highest: float, twisting: bool = False) -> ReducedRod:
+    """Return the free assembly as a rod in few coordinates, its own exact solutions at a few frequencies; see `rod_poles`."""
+    structure = rod_structure(assembly, twisting)
+    rigid = np.ones((structure.mass.shape[0], 1)) / np.sqrt(np.sum(structure.mass))
+    elastic = projection_basis(structure, rigid, [np.zeros_like(structure.mass)], highest)
+    _, shapes = scipy.linalg.eigh(elastic.T @ structure.stiffness @ elastic, elastic.T @ structure.mass @ elastic)
+    basis = np.hstack([rigid, elastic @ shapes])
+    stiffness = basis.T @ (structure.stiffness + 1j * structure.structural_damping) @ basis
+    damping = basis.T @ structure.damping @ basis
+    # nothing holds a free rod
+    for matrix in (stiffness, damping):
+        matrix[0], matrix[:, 0] = 0.0, 0.0
+    return ReducedRod(stiffness, damping, basis[structure.index])
 
 
 def _pieces(assembly: ToolAssembly) -> list[tuple[int, float, BeamSegment]]:

@@ -18,7 +18,7 @@ from rcsa_ident.machine.responses import in_plane
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.tool_holder.rods import axial_poles
+from rcsa_ident.tool_holder.rods import rod_poles
 from rcsa_ident.workflows.compare import Place
 from rcsa_ident.workflows.contact import neighbour_noise
 
@@ -101,7 +101,7 @@ def axial_flange_from_tap(tooling: Tooling, omega: FloatArray, values: ComplexAr
     model_share : float [-]
         As in `flange_from_taps`.
     """
-    free = axial_poles(tooling.assembly, float(omega[-1])).receptance(omega).values
+    free = rod_poles(tooling.assembly, float(omega[-1])).receptance(omega).values
     between = free[:, 0, 1] * free[:, 1, 0]
     left = free[:, 0, 0] - values
     std = np.hypot(neighbour_noise(values), model_share * np.abs(values))

@@ -17,7 +17,7 @@ from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.tool_holder.rods import axial_poles
+from rcsa_ident.tool_holder.rods import rod_poles
 from tests.fixtures import by_hand
 
 FREQUENCY = np.arange(100.0, 4000.0, 2.0)
@@ -40,7 +40,7 @@ def spindle(omega):
 
 def tip(path, omega=OMEGA):
     """A tooling's tip on it."""
-    free = axial_poles(read_tooling(path).assembly, 8e4).receptance(omega).values
+    free = rod_poles(read_tooling(path).assembly, 8e4).receptance(omega).values
     return free[:, 0, 0] - free[:, 0, 1] * free[:, 1, 0] / (free[:, 1, 1] + spindle(omega))
 
 

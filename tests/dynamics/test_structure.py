@@ -121,3 +121,26 @@ def test_arrays_are_read_only_and_checked():
         Structure(np.eye(2), np.zeros((2, 2)), np.eye(3), np.zeros((2, 2)), coordinates(1), np.array([0]))
     with pytest.raises(InputError, match="one for each index"):
         Structure(np.eye(2), np.zeros((2, 2)), np.eye(2), np.zeros((2, 2)), coordinates(2), np.array([0]))
+
+
+def test_coordinates_that_are_combinations_of_freedoms():
+    """Their receptances are the same combinations of those of the freedoms themselves, and so are their poles."""
+    rng = np.random.default_rng(5)
+    root, turn = rng.normal(size=(6, 6)), rng.normal(size=(6, 2))
+    stiffness = 1e6 * (root @ root.T + np.eye(6))
+    matrices = np.eye(6), 1e-4 * stiffness, stiffness, 0.01 * stiffness
+    own = Structure(*matrices, coordinates(6), np.arange(6))
+    combined = Structure(*matrices, coordinates(2), shapes=turn)
+    omega = np.linspace(100.0, 4000.0, 40)
+    expected = turn.T @ own.receptance(omega).values @ turn
+    np.testing.assert_allclose(combined.receptance(omega).values, expected, rtol=1e-9)
+    np.testing.assert_allclose(poles(combined, 5000.0).receptance(omega).values, expected, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_array_equal(combined.ports, turn)
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    matrices = [np.eye(3)] * 4
+    with pytest.raises(InputError, match="shapes"):
+        Structure(*matrices, coordinates(2), shapes=np.zeros((2, 3)))
+    with pytest.raises(InputError, match="shapes"):
+        Structure(*matrices, coordinates(2), np.array([0, 1]), shapes=np.zeros((3, 2)))

@@ -8,18 +8,17 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.mode_synthesis import WHOLE_FLANGE
 from rcsa_ident.machine.robot.inertia import mass_matrix
 from rcsa_ident.machine.robot.kinematics import PosedChain, posed
 from rcsa_ident.machine.robot.model import Frame, RobotModel
 
-#: Directions where the tool-holder sits, in the spindle's axes.
-SPINDLE_DIRECTIONS = tuple(Coordinate("flange", d) for d in (Dof.X, Dof.SLOPE_X, Dof.Y, Dof.SLOPE_Y, Dof.Z, Dof.TORSION))
 #: From a robot's tool axes, z out of the spindle, to the spindle's, z from the tip into it.
 _INTO_SPINDLE = np.diag([1.0, -1.0, -1.0])
-#: Translations and turns (x, y, z each) as the spindle's directions: a slope in X is a turn about y, one in Y a turn about -x.
+#: Translations and turns (x, y, z each) as the spindle's directions, in the order of `WHOLE_FLANGE`: a slope in X is a turn about y, one in
+#: Y a turn about -x.
 _DIRECTIONS = np.zeros((6, 6))
 for _row, (_turn, _sign) in enumerate([(0, 1.0), (4, 1.0), (1, 1.0), (3, -1.0), (2, 1.0), (5, 1.0)]):
     _DIRECTIONS[_row, _turn] = _sign
@@ -87,7 +86,7 @@ def _structure(chain: PosedChain, point: FloatArray, axes: FloatArray, direction
     seen = directions @ np.concatenate([axes.T @ motion[:3], axes.T @ motion[3:]])
     mass = mass_matrix(chain)
     damping, stiffness = np.diag(chain.chain.damping), np.diag(chain.chain.stiffness)
-    return Structure(mass, damping, stiffness, np.zeros_like(mass), SPINDLE_DIRECTIONS, shapes=seen.T)
+    return Structure(mass, damping, stiffness, np.zeros_like(mass), WHOLE_FLANGE, shapes=seen.T)
 
 
 def _about_z(turn: float) -> FloatArray:
