@@ -32,6 +32,7 @@ CLAIMS = (
 #: Each is a module with ``main(arguments)``.
 STUDIES = (
     "study",
+    "identification",
     "search_trace",
     "lobes_truth",
     "tested_cuts",

@@ -1,4 +1,4 @@
-"""Cross FRF of a candidate with its gradient, and each cut's delay; arrays and scalars only.
+"""Each cut's delay, what lines weigh, and the cross FRF of complex modes; arrays and scalars only.
 
 Scaled units: slopes are multiplied and moments divided by a lever, so that all receptances are in m/N. A symmetric 2 x 2
 block is stored as its entries (tt, tr, rr).
@@ -10,194 +10,6 @@ import math
 
 import numba
 import numpy as np
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _factor_solve(matrix, right, columns):
-    """Solve a complex symmetric system in place: L D L^T, lower triangle read, the first `columns` of `right` overwritten."""
-    m = right.shape[0]
-    for j in range(m):
-        inverse = 1.0 / matrix[j, j]
-        for i in range(j + 1, m):
-            ratio = matrix[i, j] * inverse
-            for k in range(i, m):
-                matrix[k, i] -= ratio * matrix[k, j]
-            for c in range(columns):
-                right[i, c] -= ratio * right[j, c]
-        # kept for the way back: the pivots are not needed otherwise
-        matrix[j, j] = inverse
-    for j in range(m - 1, -1, -1):
-        inverse = matrix[j, j]
-        for c in range(columns):
-            total = right[j, c]
-            for i in range(j + 1, m):
-                total -= matrix[i, j] * right[i, c]
-            right[j, c] = total * inverse
-
-
-@numba.njit(cache=True, error_model="numpy")
-def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder, values, gradient):
-    """Fill `values` (n, o) with motion per tip force and, if it has rows, `gradient` (n, o, p).
-
-    B = psi^T (K - w^2 + i w factor factor^T)^-1 psi + R, K_ij = omega_i omega_j (delta_ij + x softening_ij);
-    output b (a row: the flange's own, or another place's, or what `shares` makes of them) answers g = b x with
-    x = (A22 + K_joint^-1 + B)^-1 A21 e0; dg = db x - y^T (dB + dK_joint^-1) x, y = (A22 + K_joint^-1 + B)^-1 b^T.
-    A point of the tool-holder answers c + b x with b = -A_p2 and c its direct receptance, the machine's motion not being its own.
-
-    Parameters
-    ----------
-    omega_n : (m,); factor : (m, m) lower triangular
-    shapes : (m + 2, 2 + e) flange t, flange r, other places; psi, and behind it the residual: of the flange transposed, a lower
-        triangular factor of R, of other places to the flange's t and r, as it is
-    softening : (m, m) symmetric, or (0, 0) where nothing changes with speed
-    joint : (4,) k_t, k_r, c_t, c_r, or (6,) with the shares by which natural frequencies and damping differ where the spindle stands still
-    shares : (o, 1 + e) what of the flange's motion and of the other places' is in each output
-    points : (n, 4) omega, x, 1 for motions of the machine and 0 for those of the tool-holder, 1 where the spindle stands still
-    holder : (n, 8) A22 tt, tr, rr, A21 e0 t, r, c and b of a point of the tool-holder (zeros for the machine's)
-
-    The gradient's columns: log omega_n (m), psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3),
-    of each other place psi's column (m) and its residual (2), with six of the joint what standing still changes (2), with softening
-    its lower triangle by rows, joint (4); where it has six more, A22's tt, tr, rr, A21 e0's t, r and c, where all points of the tool-holder
-    are the tip: b = -A21 e0 changes with the latter two.
-    """
-    m = omega_n.size
-    outputs, places = shares.shape[0], shares.shape[1] - 1
-    psi, residual = shapes[:m], shapes[m:].T
-    soft = softening.shape[0] > 0
-    damping = factor @ factor.T
-    stills = joint.size == 6
-    r_tt = residual[0, 0] ** 2
-    r_tr = residual[0, 0] * residual[1, 0]
-    r_rr = residual[1, 0] ** 2 + residual[1, 1] ** 2
-    stiffness = np.zeros((m, m))
-    dynamic = np.empty((m, m), dtype=np.complex128)
-    u = np.empty((m, 2 + places), dtype=np.complex128)
-    s = np.empty((places, 2), dtype=np.complex128)
-    p = np.empty(m, dtype=np.complex128)
-    q = np.empty(m, dtype=np.complex128)
-    lp = np.empty(m, dtype=np.complex128)
-    lq = np.empty(m, dtype=np.complex128)
-    for f in range(points.shape[0]):
-        w, x, own, still = points[f]
-        stiffer, slower = 1.0, 1.0
-        if stills:
-            stiffer, slower = (1.0 + still * joint[4]) ** 2, 1.0 + still * joint[5]
-        for i in range(m):
-            for j in range(i + 1):
-                k_ij = omega_n[i] ** 2 if i == j else 0.0
-                if soft:
-                    k_ij += x * softening[i, j] * omega_n[i] * omega_n[j]
-                k_ij *= stiffer
-                stiffness[i, j] = k_ij
-                stiffness[j, i] = k_ij
-                dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * slower * damping[i, j])
-            for a in range(2 + places):
-                u[i, a] = psi[i, a]
-        _factor_solve(dynamic, u, 2 + places)
-        b_tt, b_tr, b_rr = complex(r_tt, 0.0), complex(r_tr, 0.0), complex(r_rr, 0.0)
-        for i in range(m):
-            b_tt += psi[i, 0] * u[i, 0]
-            b_tr += psi[i, 0] * u[i, 1]
-            b_rr += psi[i, 1] * u[i, 1]
-        for e in range(places):
-            for a in range(2):
-                s[e, a] = complex(residual[2 + e, a], 0.0)
-                for i in range(m):
-                    s[e, a] += psi[i, 2 + e] * u[i, a]
-        k_t = 1.0 / complex(joint[0], w * joint[2])
-        k_r = 1.0 / complex(joint[1], w * joint[3])
-        e_tt, e_tr, e_rr = holder[f, 0] + k_t + b_tt, holder[f, 1] + b_tr, holder[f, 2] + k_r + b_rr
-        inverse = 1.0 / (e_tt * e_rr - e_tr * e_tr)
-        x0 = (e_rr * holder[f, 3] - e_tr * holder[f, 4]) * inverse
-        x1 = (e_tt * holder[f, 4] - e_tr * holder[f, 3]) * inverse
-        for i in range(m):
-            q[i] = u[i, 0] * x0 + u[i, 1] * x1
-        for o in range(outputs):
-            flange = own * shares[o, 0]
-            b_t, b_r = flange * b_tt, flange * b_tr
-            for e in range(places):
-                b_t += own * shares[o, 1 + e] * s[e, 0]
-                b_r += own * shares[o, 1 + e] * s[e, 1]
-            values[f, o] = 0.0
-            if o == 0:
-                b_t += holder[f, 6]
-                b_r += holder[f, 7]
-                values[f, o] = holder[f, 5]
-            values[f, o] += b_t * x0 + b_r * x1
-            if gradient.shape[0] == 0:
-                continue
-            y0 = (e_rr * b_t - e_tr * b_r) * inverse
-            y1 = (e_tt * b_r - e_tr * b_t) * inverse
-            v0, v1 = flange - y0, -y1
-            for i in range(m):
-                p[i] = u[i, 0] * v0 + u[i, 1] * v1
-                for e in range(places):
-                    p[i] += own * shares[o, 1 + e] * u[i, 2 + e]
-            for j in range(m):
-                sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
-                for i in range(j, m):
-                    sum_p += factor[i, j] * p[i]
-                    sum_q += factor[i, j] * q[i]
-                lp[j], lq[j] = sum_p, sum_q
-            row = gradient[f, o]
-            k = 3 * m
-            for i in range(m):
-                if soft:
-                    kp, kq = complex(0.0, 0.0), complex(0.0, 0.0)
-                    for j in range(m):
-                        kp += stiffness[i, j] * p[j]
-                        kq += stiffness[i, j] * q[j]
-                    row[i] = -p[i] * kq - kp * q[i]
-                else:
-                    row[i] = -2.0 * stiffness[i, i] * p[i] * q[i]
-                row[m + 2 * i] = v0 * q[i] + p[i] * x0
-                row[m + 2 * i + 1] = v1 * q[i] + p[i] * x1
-                for j in range(i + 1):
-                    row[k] = complex(0.0, -w * slower) * (p[i] * lq[j] + lp[j] * q[i])
-                    k += 1
-            row[k] = v0 * x0
-            row[k + 1] = v0 * x1 + v1 * x0
-            row[k + 2] = v1 * x1
-            k += 3
-            for e in range(places):
-                share = own * shares[o, 1 + e]
-                for i in range(m):
-                    row[k + i] = share * q[i]
-                row[k + m] = share * x0
-                row[k + m + 1] = share * x1
-                k += m + 2
-            if stills:
-                # all natural frequencies, and all of the damping, by a share
-                elastic, lost = complex(0.0, 0.0), complex(0.0, 0.0)
-                for i in range(m):
-                    lost += lp[i] * lq[i]
-                    for j in range(m):
-                        elastic += p[i] * stiffness[i, j] * q[j]
-                row[k] = -2.0 * still / (1.0 + still * joint[4]) * elastic
-                row[k + 1] = complex(0.0, -w * still) * lost
-                k += 2
-            if soft:
-                for i in range(m):
-                    scale = -x * stiffer * omega_n[i]
-                    for j in range(i):
-                        row[k] = scale * omega_n[j] * (p[i] * q[j] + p[j] * q[i])
-                        k += 1
-                    row[k] = scale * omega_n[i] * p[i] * q[i]
-                    k += 1
-            row[k] = y0 * x0 * k_t * k_t
-            row[k + 1] = y1 * x1 * k_r * k_r
-            row[k + 2] = complex(0.0, w) * row[k]
-            row[k + 3] = complex(0.0, w) * row[k + 1]
-            k += 4
-            if k < row.size:
-                row[k] = -y0 * x0
-                row[k + 1] = -y0 * x1 - y1 * x0
-                row[k + 2] = -y1 * x1
-                # the first output alone holds the tool-holder's own motion
-                away = 1.0 - own if o == 0 else 0.0
-                row[k + 3] = y0 - away * x0
-                row[k + 4] = y1 - away * x1
-                row[k + 5] = away
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -217,16 +29,18 @@ def fit_cuts(lines, weights, model, start, prior, nuisance, grid):
     """
     here = np.empty(6)
     there = np.empty(6)
+    overlap, turn, step = np.empty(grid), np.empty((2, grid)), np.empty((2, grid))
     for cut in range(start.size - 1):
         first, last = start[cut], start[cut + 1]
         mean, delay_weight, period = prior[cut, 0], prior[cut, 1], prior[cut, 3]
         delay, angle = nuisance[cut]
         if grid > 0:
             best = _cut_misfit(lines, weights, model, first, last, delay, angle) + delay_weight * (delay - mean) ** 2
+            size = _grid_overlap(lines, weights, model, first, last, period / grid, angle, overlap, turn, step)
             for k in range(grid):
                 trial = period * k / grid
                 trial += period * np.round((mean - trial) / period) if delay_weight > 0.0 else 0.0
-                value = _cut_misfit(lines, weights, model, first, last, trial, angle) + delay_weight * (trial - mean) ** 2
+                value = size - 2.0 * overlap[k] + delay_weight * (trial - mean) ** 2
                 if value < best:
                     best, delay = value, trial
         _cut_normal(lines, weights, model, first, last, prior[cut], delay, angle, here)
@@ -279,6 +93,43 @@ def _cut_misfit(lines, weights, model, first, last, delay, angle):
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _grid_overlap(lines, weights, model, first, last, spacing, angle, overlap, turn, step):
+    """Fill `overlap` with sum w Re(conj(g) h e^{i omega delay}) at delays `spacing` apart; return sum w (|h|^2 + |g|^2).
+
+    h = c - a e^{i m angle}; |h e^{i omega delay} - g|^2 = |h|^2 + |g|^2 - 2 Re(conj(g) h e^{i omega delay}): a delay changes one product.
+    """
+    count, size = overlap.size, 0.0
+    real, imag, ahead_real, ahead_imag = turn[0], turn[1], step[0], step[1]
+    overlap[:], real[:], imag[:] = 0.0, 1.0, 0.0
+    order, gap = 0.0, 0.0
+    for j in range(first, last):
+        ahead = weights[j, 1] - order
+        if ahead != 0.0:
+            if ahead != gap:
+                gap = ahead
+                phase = gap * weights[j, 0] / weights[j, 1] * spacing
+                each, power = complex(math.cos(phase), math.sin(phase)), complex(1.0, 0.0)
+                for k in range(count):
+                    ahead_real[k], ahead_imag[k] = power.real, power.imag
+                    power *= each
+            order = weights[j, 1]
+            for k in range(count):
+                turned = real[k] * ahead_real[k] - imag[k] * ahead_imag[k]
+                imag[k] = real[k] * ahead_imag[k] + imag[k] * ahead_real[k]
+                real[k] = turned
+        rest = lines[j, 0]
+        if angle != 0.0:
+            rest -= lines[j, 1] * complex(math.cos(order * angle), math.sin(order * angle))
+        else:
+            rest -= lines[j, 1]
+        size += weights[j, 2] * (rest.real**2 + rest.imag**2 + model[j].real ** 2 + model[j].imag ** 2)
+        both = weights[j, 2] * rest * model[j].conjugate()
+        for k in range(count):
+            overlap[k] += both.real * real[k] - both.imag * imag[k]
+    return size
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _cut_normal(lines, weights, model, first, last, prior, delay, angle, out):
     """Fill `out` with a cut's misfit and priors, half its gradient and its Gauss-Newton matrix: value, g0, g1, h00, h01, h11."""
     late = delay - prior[0]
@@ -317,24 +168,61 @@ def _cut_normal(lines, weights, model, first, last, prior, delay, angle, out):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def whiten(gradient, extra, model, weight, chain, out):
-    """Fill `out` (2 n, p + c) with the residual's real and imaginary rows: -sqrt(weight) (gradient chain, model extra).
+def turn_lines(lines, weights, cut, nuisance, turned):
+    """Fill `turned` (n, 2) with the lines as they would be without their cut's delay, and with the air cut's part of them.
 
     Parameters
     ----------
-    gradient : (n, p or more) complex; extra : (n, c) complex, d log model / d unknown of the force
-    model : (n,) complex; weight : (n,); chain : (p,)
+    lines : (n, 2) complex, c and a; weights : (n, 3): omega, order, w; cut : (n,)
+    nuisance : (k, 2): delay, angle
+    """
+    for f in range(cut.size):
+        delay, angle = nuisance[cut[f]]
+        phase = weights[f, 0] * delay
+        back = complex(math.cos(phase), math.sin(phase))
+        air = lines[f, 1] * back
+        if angle != 0.0:
+            phase = weights[f, 1] * angle
+            air *= complex(math.cos(phase), math.sin(phase))
+        turned[f, 0] = lines[f, 0] * back - air
+        turned[f, 1] = air
+
+
+@numba.njit(cache=True, error_model="numpy")
+def whiten(gradient, extra, weight, chain, out):
+    """Fill `out` (p + c, 2 n) with the residual's change: real, then imaginary parts of -sqrt(weight) (chain gradient, extra).
+
+    Parameters
+    ----------
+    gradient : (n, p or more) complex; extra : (n, c) complex; weight : (n,); chain : (p,)
     """
     n, p = gradient.shape[0], chain.size
     for f in range(n):
         scale = -math.sqrt(weight[f])
         for k in range(p):
-            out[f, k] = scale * chain[k] * gradient[f, k].real
-            out[n + f, k] = scale * chain[k] * gradient[f, k].imag
+            out[k, f] = scale * chain[k] * gradient[f, k].real
+            out[k, n + f] = scale * chain[k] * gradient[f, k].imag
         for c in range(extra.shape[1]):
-            value = scale * model[f] * extra[f, c]
-            out[f, p + c] = value.real
-            out[n + f, p + c] = value.imag
+            out[p + c, f] = scale * extra[f, c].real
+            out[p + c, n + f] = scale * extra[f, c].imag
+
+
+@numba.njit(cache=True, error_model="numpy")
+def force_rows(slope, lines, out):
+    """Fill `out` (c, 2 n o) with the lines' change with each unknown of the force: real parts, then imaginary parts of lines slope.
+
+    Parameters
+    ----------
+    slope : (n, c) complex, change of the force's logarithm; lines : (n, o) complex
+    """
+    n, outputs = lines.shape
+    for c in range(slope.shape[1]):
+        row = out[c]
+        for f in range(n):
+            for o in range(outputs):
+                value = lines[f, o] * slope[f, c]
+                row[f * outputs + o] = value.real
+                row[(n + f) * outputs + o] = value.imag
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -343,8 +231,8 @@ def mix_cuts(jacobian, columns, cut, own, first, tail, inner, mixed):
 
     Parameters
     ----------
-    jacobian : (2 n, q) real over imaginary rows; its first `own` columns are the parameters from `first` on, the rest from `tail` on
-    columns : (n, 2) complex, change of the lines with delay and angle of their cut; cut : (n,)
+    jacobian : (q, 2 n) real and then imaginary parts; its first `own` rows are the parameters from `first` on, the rest from `tail` on
+    columns : (n, 2) complex, change of the lines with delay and angle of their cut; cut : (n,), ascending
     """
     n = cut.size
     for f in range(n):
@@ -353,14 +241,36 @@ def mix_cuts(jacobian, columns, cut, own, first, tail, inner, mixed):
             real, imag = columns[f, i].real, columns[f, i].imag
             inner[k, i, 0] += real * columns[f, 0].real + imag * columns[f, 0].imag
             inner[k, i, 1] += real * columns[f, 1].real + imag * columns[f, 1].imag
-            row = mixed[k, i]
-            for c in range(own):
-                row[first + c] += real * jacobian[f, c] + imag * jacobian[n + f, c]
-            for c in range(own, jacobian.shape[1]):
-                row[tail + c - own] += real * jacobian[f, c] + imag * jacobian[n + f, c]
+    for c in range(jacobian.shape[0]):
+        row, place = jacobian[c], first + c if c < own else tail + c - own
+        f = 0
+        while f < n:
+            k = cut[f]
+            delay, angle = 0.0, 0.0
+            while f < n and cut[f] == k:
+                real, imag = row[f], row[n + f]
+                delay += columns[f, 0].real * real + columns[f, 0].imag * imag
+                angle += columns[f, 1].real * real + columns[f, 1].imag * imag
+                f += 1
+            mixed[k, 0, place] += delay
+            mixed[k, 1, place] += angle
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@numba.njit(cache=True, error_model="numpy")
+def sum_cuts(columns, cut, rest, sums):
+    """Add to `sums` (k, 2) what the lines of each cut say of its delay and angle.
+
+    Parameters
+    ----------
+    columns : (n, 2) complex, as in `mix_cuts`; cut : (n,); rest : (2 n,) residual, real and then imaginary parts
+    """
+    n = cut.size
+    for f in range(n):
+        for i in range(2):
+            sums[cut[f], i] += columns[f, i].real * rest[f] + columns[f, i].imag * rest[n + f]
+
+
+@numba.njit(cache=True, error_model="numpy")
 def modal_cross_frf(modes, joint, omega, flange, tip, out):
     """Fill `out` (2, n) with real and imaginary part of the cross FRF of complex modes: the search's cheap candidate.
 
@@ -413,7 +323,7 @@ def modal_cross_frf(modes, joint, omega, flange, tip, out):
         out[1, f] = (ni * det_r - nr * det_i) * scale
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@numba.njit(cache=True, error_model="numpy")
 def best_grid_misfit(model, measured, weight, table, start, group, totals):
     """Add to `totals` the misfit of each cut at its best delay on a grid, by group (tooling).
 
@@ -422,21 +332,19 @@ def best_grid_misfit(model, measured, weight, table, start, group, totals):
     Parameters
     ----------
     model : (2, n); measured : (n,) |h|^2; weight : (n,)
-    table : (d, 2, n): h e^{i omega delay} on the grid
+    table : (n, 2, d): h e^{i omega delay} on the grid
     start : (k + 1,); group : (k,)
     """
-    delays = table.shape[0]
+    delays = table.shape[2]
     overlap = np.empty(delays)
     for cut in range(start.size - 1):
         first, last = start[cut], start[cut + 1]
-        best = 0
-        for d in range(delays):
-            total = 0.0
-            for f in range(first, last):
-                total += weight[f] * (model[0, f] * table[d, 0, f] + model[1, f] * table[d, 1, f])
-            overlap[d] = total
-            if total > overlap[best]:
-                best = d
+        overlap[:] = 0.0
+        for f in range(first, last):
+            real, imag = weight[f] * model[0, f], weight[f] * model[1, f]
+            for d in range(delays):
+                overlap[d] += real * table[f, 0, d] + imag * table[f, 1, d]
+        best = np.argmax(overlap)
         # the grid is fine enough for a parabola through the best delay and its neighbours; the period closes it
         before, after = overlap[best - 1], overlap[(best + 1) % delays]
         bend = 2.0 * overlap[best] - before - after

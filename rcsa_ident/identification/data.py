@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -200,7 +201,7 @@ def nodes(sweep: FloatArray) -> FloatArray:
     return NODE * 0.5 * np.abs(sweep[:, 0]) * sweep[:, 1]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class CutPrior:
     """What is known beforehand of each cut's delay and of the angle to its air cut; arrays of shape (k,).
 
@@ -230,7 +231,7 @@ class CutPrior:
         for each in fields(self):
             object.__setattr__(self, each.name, frozen(getattr(self, each.name)))
 
-    @property
+    @cached_property
     def weights(self) -> FloatArray:
         """Weights of delay and angle, shape (k, 2)."""
         return np.stack([self.delay_weight, self.angle_weight], axis=1)
@@ -240,7 +241,7 @@ class CutPrior:
         """All side by side, shape (k, 5)."""
         return np.stack([getattr(self, each.name) for each in fields(self)], axis=1)
 
-    @property
+    @cached_property
     def rows(self) -> FloatArray:
         """The first four side by side, as the kernel takes them, shape (k, 4)."""
         return np.stack([self.delay, self.delay_weight, self.angle_weight, self.tooth_period], axis=1)

@@ -19,7 +19,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.identification._kernels import cross_frf
+from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, chain, lower_triangle, residual_turn, scaled_joint, unpack
 from rcsa_ident.identification.posterior import Posterior
@@ -331,14 +331,16 @@ def _cross(
     if layout.places:
         raise InputError("layout", "a layout with other places' motion", "one of the flange's motion alone, as a posterior has")
     axis, joint = unpack(theta[:-JOINT], layout), scaled_joint(theta[-JOINT:])
-    n = points.shape[0]
-    values = np.empty((n, 1), dtype=complex)
-    gradient = np.empty((n if slopes else 0, 1, theta.size), dtype=complex)
-    cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, joint, np.ones((1, 1)), points, holder, values, gradient)
-    columns, core = gradient[:, 0], layout.core
+    n, one = points.shape[0], np.ones((1, 1))
+    values, kept = cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, joint, one, points, holder)
+    rows = np.empty((theta.size, 2 * n if slopes else 0))
+    if slopes:
+        # the kernel's joint is in units of itself, its logarithm is the unknown
+        scale, weight = np.concatenate([chain(axis, layout), joint]), np.ones((n, 1), dtype=complex)
+        cross_frf_gradient(axis.omega_n, axis.factor, axis.softening, joint, one, points, kept, weight, scale, rows)
+    columns, core = (rows[:, : rows.shape[1] // 2] + 1j * rows[:, rows.shape[1] // 2 :]).T, layout.core
     columns[:, core - 3 : core] = columns[:, core - 3 : core] @ residual_turn(axis.residual)
-    # the kernel's joint is in units of itself, its logarithm is the unknown
-    return values[:, 0], columns * np.concatenate([chain(axis, layout), joint])
+    return values[:, 0], columns
 
 
 def _tip(theta: FloatArray, layout: AxisLayout, holder: Receptance) -> tuple[ComplexArray, ComplexArray]:

@@ -215,8 +215,8 @@ class _Problem:
         self.start = np.searchsorted(axis.cut, np.arange(len(data.cut_ids) + 1))
         self.weight = method.cost.weights(axis)
         period = data.cut_prior.tooth_period[axis.cut]
-        delay = np.arange(GRID)[:, None] / GRID * period[None, :]
-        turned = axis.measured * np.exp(1j * axis.omega * delay)
+        delay = np.arange(GRID) / GRID * period[:, None]
+        turned = axis.measured[:, None] * np.exp(1j * axis.omega[:, None] * delay)
         self.table = np.ascontiguousarray(np.stack([turned.real, turned.imag], axis=1))
         self.measured = np.abs(axis.measured) ** 2
         self.flange = np.ascontiguousarray(np.concatenate([[c.real, c.imag] for c in axis.flange.T]))
@@ -293,12 +293,12 @@ class _Problem:
         return self._best_delays(np.asarray(result.measured["model"]))
 
     def _best_delays(self, model: np.ndarray) -> FloatArray:
-        overlap = (model.real * self.table[:, 0] + model.imag * self.table[:, 1]) * self.weight
+        overlap = self.weight[:, None] * (model.real[:, None] * self.table[:, 0] + model.imag[:, None] * self.table[:, 1])
         best = np.zeros(len(self.data.cut_ids))
         for cut in range(best.size):
             first, last = self.start[cut], self.start[cut + 1]
             if last > first:
-                best[cut] = np.argmax(overlap[:, first:last].sum(axis=1)) / GRID * self.data.cut_prior.tooth_period[cut]
+                best[cut] = np.argmax(overlap[first:last].sum(axis=0)) / GRID * self.data.cut_prior.tooth_period[cut]
         return best
 
 

@@ -124,7 +124,10 @@ def fit_jointly(
     found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
     if data.speed_changes:
         with_softening = _start(data, found.candidate, True)
-        moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report)
+        moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report, ROUGHLY)
+        # a fine polish gains less than what separates two answers
+        if evidence(moving, other) < evidence(found, misfit) + SAME_ANSWER:
+            moving, other = refine_and_learn_noise(misfit_of, moving.candidate.point, other.model_error, other.cut_weight, report)
         if evidence(moving, other) < evidence(found, misfit):
             found, misfit = moving, other
     return exchange_modes(found, misfit, data.band_hz, report, rounds=2), misfit

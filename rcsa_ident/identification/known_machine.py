@@ -44,6 +44,11 @@ class Gaussian:
         return inverse
 
     @cached_property
+    def information(self) -> FloatArray:
+        """jacobian^T jacobian, shape (p, p)."""
+        return self.jacobian.T @ self.jacobian
+
+    @cached_property
     def log_volume(self) -> float:
         """log det of the information matrix."""
         return float(-2.0 * np.sum(np.log(np.diag(self._factor))))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.candidate import Candidate
@@ -101,7 +101,7 @@ def refine(
         gained = here.cost - trial.cost
         theta = theta + step
         damping = max(0.2 * damping, 1e-8)
-        here = misfit.evaluate(theta, layout, trial.nuisance, grid, normal=True)
+        here = misfit.linearised(trial, theta, layout)
         quiet = quiet + 1 if gained < tolerance * here.cost else 0
         if quiet == 2:
             return Solution(theta, layout, here, True, step_number + 1)
@@ -113,13 +113,13 @@ def _step(misfit: Misfit, theta: FloatArray, layout: Unknowns, here: Evaluation,
     linear = here.linear
     assert linear is not None
     scale = np.sqrt(np.maximum(np.diag(linear.hessian), 1e-12))
-    matrix = linear.hessian / np.outer(scale, scale)
-    matrix[np.diag_indices_from(matrix)] += damping
-    try:
-        factor = scipy.linalg.cho_factor(matrix, check_finite=False)
-    except scipy.linalg.LinAlgError:
+    matrix = linear.hessian / (scale[:, None] * scale)
+    matrix.flat[:: scale.size + 1] += damping
+    # straight to LAPACK: at this size SciPy's own checks would cost as much
+    factor, failed = dpotrf(matrix, lower=1, clean=0)
+    if failed:
         return None
-    velocity = -scipy.linalg.cho_solve(factor, linear.gradient / scale, check_finite=False) / scale
+    velocity = -dpotrs(factor, linear.gradient / scale, lower=1)[0] / scale
     largest = float(np.max(np.abs(velocity)))
     if not np.isfinite(largest):
         return None
@@ -129,7 +129,7 @@ def _step(misfit: Misfit, theta: FloatArray, layout: Unknowns, here: Evaluation,
     ahead = here.nuisance + PROBE * cuts * _CUT_UNITS
     change = misfit.residual_at(theta + PROBE * velocity, layout, ahead).minus(here.residual)
     bend = change.times(1.0 / PROBE).minus(linear.push(velocity, cuts)).times(2.0 / PROBE)
-    acceleration = -0.5 * scipy.linalg.cho_solve(factor, linear.pull(bend) / scale, check_finite=False) / scale
+    acceleration = -0.5 * dpotrs(factor, linear.pull(bend) / scale, lower=1)[0] / scale
     # where the bend is as large as the step, the expansion says nothing
     bent = 2.0 * np.linalg.norm(acceleration * scale) < LARGEST_BEND * np.linalg.norm(velocity * scale)
     return velocity + acceleration if bent else velocity

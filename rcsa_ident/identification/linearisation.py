@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification._kernels import sum_cuts
 from rcsa_ident.identification.parameters import Unknowns
 
 #: Unit of a delay in the normal equations [s].
@@ -59,7 +60,7 @@ class Linearisation:
     Parameters
     ----------
     layout : Unknowns
-    jacobians : tuple of arrays, shape (2 n, q + c)
+    jacobians : tuple of arrays, shape (q + c, 2 n)
         Change of each axis' lines with its own parameters, the joint's and the coefficients'.
     columns : tuple of complex arrays, shape (n, 2)
         The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
@@ -77,8 +78,8 @@ class Linearisation:
         Normal equations of each cut's delay and angle.
     mixed : array, shape (k, 2, p)
         What couples them to the parameters.
-    compliance : tuple of complex arrays, shape (n, o, 3)
-        Change of each axis' model with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
+    compliance : tuple of complex arrays, shape (n o, 3)
+        Change of each axis' residual, as complex numbers, with the flange's receptance tt, tr, rr, for what may be added to it.
     """
 
     layout: Unknowns
@@ -104,7 +105,7 @@ class Linearisation:
         lines = []
         for i, (jacobian, columns, cut) in enumerate(zip(self.jacobians, self.columns, self.cut, strict=True)):
             turned = columns[:, 0] * cuts[cut, 0] + columns[:, 1] * cuts[cut, 1]
-            change = jacobian @ np.concatenate([step[self.layout.axis(i)], shared])
+            change = np.concatenate([step[self.layout.axis(i)], shared]) @ jacobian
             lines.append(change + np.concatenate([turned.real, turned.imag]))
         prior = self.cut_prior * cuts
         prior[:, 0] += self.clamping[1] * step[self.clamping[0]]
@@ -115,15 +116,14 @@ class Linearisation:
         slope = self.own.T @ residual.own
         right = self.cut_prior * residual.cuts
         for i, (jacobian, columns, cut, r) in enumerate(zip(self.jacobians, self.columns, self.cut, residual.lines, strict=True)):
-            down = jacobian.T @ r
+            down = jacobian @ r
             block = self.layout.axis(i)
             size = block.stop - block.start
             slope[block] += down[:size]
             slope[self._shared] += down[size:]
-            n = cut.size
-            for j in range(2):
-                right[:, j] += np.bincount(cut, columns[:, j].real * r[:n] + columns[:, j].imag * r[n:], minlength=right.shape[0])
-        np.add.at(slope, self.clamping[0], self.clamping[1] * residual.cuts[:, 0])
+            sum_cuts(columns, cut, r, right)
+        if self.layout.clampings:
+            np.add.at(slope, self.clamping[0], self.clamping[1] * residual.cuts[:, 0])
         return slope - np.tensordot(_solve_pairs(self.inner, right), self.mixed, axes=2)
 
     def border(self, rows: Mapping[int, FloatArray], together: int, residual: Residual) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -156,14 +156,13 @@ class Linearisation:
             groups = changes.reshape(2 * n, -1, together)
             own += np.einsum("nki,nkj->kij", groups, groups, optimize=True)
             block = self.layout.axis(i)
-            products = self.jacobians[i].T @ changes
+            products = self.jacobians[i] @ changes
             mixed[block] += products[: block.stop - block.start]
             mixed[self._shared] += products[block.stop - block.start :]
         solved = np.linalg.solve(self.inner, turned)
         right = self.cut_prior * residual.cuts
         for lines, index, r in zip(self.columns, self.cut, residual.lines, strict=True):
-            for j in range(2):
-                right[:, j] += np.bincount(index, lines[:, j].real * r[: index.size] + lines[:, j].imag * r[index.size :], minlength=cuts)
+            sum_cuts(lines, index, r, right)
         gradient -= np.tensordot(right, solved, axes=2)
         shape = (cuts, 2, -1, together)
         own -= np.einsum("cjki,cjkl->kil", turned.reshape(shape), solved.reshape(shape), optimize=True)

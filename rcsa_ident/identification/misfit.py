@@ -10,11 +10,13 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.force import ForceTerm
-from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
+from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
+from rcsa_ident.identification._kernels import fit_cuts, force_rows, mix_cuts, turn_lines
 from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
 from rcsa_ident.identification.linearisation import DELAY_UNIT, Linearisation, Residual
 from rcsa_ident.identification.parameters import (
     JOINT,
+    RESIDUAL_UNIT,
     AxisLayout,
     AxisParameters,
     Layout,
@@ -47,6 +49,8 @@ class Evaluation:
         Its squares add up to the cost.
     linear : Linearisation or None
         Gradient and Gauss-Newton matrix of half the cost, where asked for.
+    answers : sequence of Answer
+        What they can be made of, until they are.
     """
 
     cost: float
@@ -54,6 +58,7 @@ class Evaluation:
     models: tuple[ComplexArray, ...]
     residual: Residual
     linear: Linearisation | None = None
+    answers: Sequence[Answer] = ()
 
     @property
     def chi2(self) -> tuple[float, ...]:
@@ -122,7 +127,7 @@ class Misfit:
         normal : bool
             Whether gradient and Gauss-Newton matrix are made, too.
         """
-        answers = self._answers(theta, layout, normal)
+        answers = self._answers(theta, layout)
         models = [answer.model for answer in answers]
         nuisance = nuisance.copy()
         prior = self._cut_prior(theta, layout)
@@ -130,8 +135,22 @@ class Misfit:
         lines = self._in_order(self._seen(theta, layout)) if self.data.talk_place else self._lines
         fit_cuts(lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid * int(prior.pitches.max()))
         residual = self._residual(theta, layout, models, nuisance, prior)
-        linear = self._linearise(theta, layout, answers, residual, nuisance, prior) if normal else None
-        return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
+        here = Evaluation(residual.cost, nuisance, tuple(models), residual, answers=answers)
+        return self.linearised(here, theta, layout) if normal else here
+
+    def linearised(self, here: Evaluation, theta: FloatArray, layout: Unknowns) -> Evaluation:
+        """Return an evaluation with its gradient and Hessian.
+
+        Parameters
+        ----------
+        here : Evaluation
+            At `theta`, as `evaluate` has returned it.
+        theta : array, shape (p,)
+        layout : Layout
+        """
+        answers = self._with_slopes(here.answers, theta, layout)
+        linear = self._linearise(theta, layout, answers, here.residual, here.nuisance, self._cut_prior(theta, layout))
+        return replace(here, linear=linear, answers=())
 
     def root_weight(self, axis: int) -> FloatArray:
         """Return one over the standard deviation of each line of an axis, shape (n o,) [N/m]."""
@@ -139,7 +158,7 @@ class Misfit:
 
     def models(self, theta: FloatArray, layout: Unknowns) -> tuple[ComplexArray, ...]:
         """Return the model's cross FRFs on the lines of each axis, shapes (n, o) [m/N]; no delay and no noise is in them."""
-        return tuple(answer.model for answer in self._answers(theta, layout, False))
+        return tuple(answer.model for answer in self._answers(theta, layout))
 
     def residual_at(self, theta: FloatArray, layout: Unknowns, nuisance: FloatArray) -> Residual:
         """Return the residual with the cuts' delays and angles as they are given.
@@ -174,29 +193,31 @@ class Misfit:
         """Return the weights of an axis' lines, shape (n, o) [N^2/m^2]."""
         return self._axes[i].weight.reshape(-1, self._axes[i].outputs)
 
-    def _answers(self, theta: FloatArray, layout: Unknowns, normal: bool) -> Sequence[Answer]:
-        """What the model says of each axis' lines, with `normal` ready to be linearised."""
+    def _answers(self, theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
+        """What the model says of each axis' lines."""
         assert isinstance(layout, Layout)
-        logs = theta[layout.joint]
-        joint = scaled_joint(logs)
-        toolings = self._toolings(theta, layout, normal)
+        joint = scaled_joint(theta[layout.joint])
+        toolings = self._toolings(theta, layout, False)
         answers = []
         for i, (lines, part) in enumerate(zip(self._axes, layout.axes, strict=True)):
             axis = unpack(theta[layout.axis(i)], part)
-            n, o = lines.points.shape[0], lines.outputs
-            values = np.empty((n, o), dtype=complex)
-            gradient = np.empty((n if normal else 0, o, part.size + JOINT + (HOLDER if toolings else 0)), dtype=complex)
             both = np.append(joint, axis.standstill)
             holder = lines.with_toolings(toolings[i]) if toolings else lines.holder
-            cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, both, lines.shares, lines.points, holder, values, gradient)
-            slope = lines.force_slope[:, :0]
+            values, kept = cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, both, lines.shares, lines.points, holder)
+            factor, slope = lines.drawn_force, lines.force_slope[:, :0]
             if layout.coefficients:
                 factor, slope = lines.force(theta[layout.force])
-                scale = factor[:, None]
-                values *= scale
-                gradient *= scale[:, :, None] if normal else 1.0
-            answers.append(_AxisAnswer(values, gradient, slope, axis, part, np.exp(logs), toolings[i] if toolings else []))
+                values *= factor[:, None]
+            answers.append(_AxisAnswer(values, kept, factor, slope, axis, part, both, toolings[i] if toolings else []))
         return answers
+
+    def _with_slopes(self, answers: Sequence[Answer], theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
+        """The answers, ready to be linearised."""
+        found = []
+        for answer, own in zip(answers, self._toolings(theta, layout, True) or [[]] * len(answers), strict=True):
+            assert isinstance(answer, _AxisAnswer)
+            found.append(replace(answer, toolings=own))
+        return found
 
     def _in_order(self, of_axes: Sequence[ComplexArray]) -> ComplexArray:
         """Lines of all axes, cut by cut."""
@@ -244,8 +265,8 @@ class Misfit:
     ) -> Linearisation:
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
         size, cuts = layout.size, len(self.data.cut_ids)
-        own = self.prior(layout).jacobian
-        hessian = own.T @ own
+        known = self.prior(layout)
+        hessian = known.information.copy()
         cut_prior = np.sqrt(prior.weights) * np.array([DELAY_UNIT, 1.0])
         mixed = np.zeros((cuts, 2, size))
         inner = np.zeros((cuts, 2, 2))
@@ -255,11 +276,14 @@ class Misfit:
             block, felt = layout.axis(i), self._talk[i]
             jacobian, change = answer.jacobian(lines, layout)
             if felt is not None and felt < layout.coefficients:
-                jacobian[:, felt - layout.coefficients] = -lines.whitened(lines.turned(lines.talk, nuisance)[0])
+                jacobian[felt - layout.coefficients] = -lines.whitened(lines.turned(lines.talk, nuisance)[0])
             compliance.append(change)
-            part = block.stop - block.start
-            place = np.r_[block, slice(layout.tail, layout.force.stop)]
-            hessian[np.ix_(place, place)] += jacobian.T @ jacobian
+            part, shared = block.stop - block.start, slice(layout.tail, layout.force.stop)
+            product = jacobian @ jacobian.T
+            hessian[block, block] += product[:part, :part]
+            hessian[block, shared] += product[:part, part:]
+            hessian[shared, block] += product[part:, :part]
+            hessian[shared, shared] += product[part:, part:]
             columns = lines.columns(seen, nuisance)
             mix_cuts(jacobian, columns, lines.cut, part, block.start, layout.tail, inner, mixed)
             jacobians.append(jacobian)
@@ -282,7 +306,7 @@ class Misfit:
             tuple(jacobians),
             tuple(all_columns),
             index,
-            own,
+            known.jacobian,
             cut_prior,
             clamping,
             np.empty(0),
@@ -320,22 +344,23 @@ class WeightedLines:
         self.points = axis.kernel_points(relative_speed[axis.cut])
         self.holder = axis.kernel_holder
         self.force_slope = axis.force_slope
+        self.drawn_force = np.ones(axis.omega.size, dtype=complex)
         self.omega, self.order, self.cut = np.repeat(axis.omega, o), np.repeat(axis.order, o), np.repeat(axis.cut, o)
         self.lines, self.talk = axis.lines.reshape(-1, 2), axis.talk.reshape(-1, 2)
         self.weight = (_weight(axis, model_error) * cut_weight[axis.cut][:, None]).ravel()
-        self._root = np.sqrt(self.weight)
+        self.root = np.sqrt(self.weight)
+        self.rates = np.stack([self.omega, self.order, self.weight], axis=1)
         self.exact = exact or {}
 
     def turned(self, lines: ComplexArray, nuisance: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Lines, shape (n o, 2), as they would be without delay, and the air cut's part of them, shape (n o,)."""
-        delay, angle = nuisance[self.cut].T
-        back = np.exp(1j * self.omega * delay)
-        air = lines[:, 1] * np.exp(1j * self.order * angle) * back
-        return lines[:, 0] * back - air, air
+        found = np.empty_like(lines)
+        turn_lines(lines, self.rates, self.cut, nuisance, found)
+        return found[:, 0], found[:, 1]
 
     def whitened(self, values: ComplexArray) -> FloatArray:
         """In standard deviations, real over imaginary parts, shape (2 n o,)."""
-        values = values * self._root
+        values = values * self.root
         return np.concatenate([values.real, values.imag])
 
     def rest(self, lines: ComplexArray, model: ComplexArray, nuisance: FloatArray) -> FloatArray:
@@ -345,7 +370,7 @@ class WeightedLines:
     def columns(self, lines: ComplexArray, nuisance: FloatArray) -> ComplexArray:
         """The lines' change with delay and angle of their cut, shape (n o, 2)."""
         measured, air = self.turned(lines, nuisance)
-        return np.stack([1j * self.omega * DELAY_UNIT * measured, -1j * self.order * air], axis=1) * self._root[:, None]
+        return np.stack([1j * self.omega * DELAY_UNIT * measured, -1j * self.order * air], axis=1) * self.root[:, None]
 
     def with_toolings(self, toolings: Sequence[ToolingAt]) -> ComplexArray:
         """The tool-holders' receptances with those of rough toolings in place of the drawn ones, shape (n, 8)."""
@@ -354,27 +379,6 @@ class WeightedLines:
     def force(self, logs: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """What the forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c)."""
         return scaled_force(self.force_slope[:, : logs.size], logs, self.exact)
-
-    def jacobian(
-        self,
-        gradient: ComplexArray,
-        model: ComplexArray,
-        slope: ComplexArray,
-        scale: FloatArray,
-        toolings: Sequence[ToolingAt] = (),
-    ) -> FloatArray:
-        """The residual's change with the axis' own parameters, the joint and the coefficients, shape (2 n o, q + c)."""
-        rows = gradient.reshape(-1, gradient.shape[2])
-        out = np.empty((2 * rows.shape[0], scale.size + slope.shape[1]))
-        whiten(rows, np.repeat(slope, self.outputs, axis=0), model.ravel(), self.weight, scale, out)
-        for each in toolings:
-            change = -(gradient[each.points, :, scale.size : scale.size + each.values.shape[1]] @ each.slopes)
-            lines = (each.points[:, None] * self.outputs + np.arange(self.outputs)).ravel()
-            change = change.reshape(lines.size, -1) * self._root[lines, None]
-            columns = scale.size + each.unknowns
-            out[np.ix_(lines, columns)] = change.real
-            out[np.ix_(rows.shape[0] + lines, columns)] = change.imag
-        return out
 
 
 def scaled_force(slope: ComplexArray, logs: FloatArray, exact: Mapping[ForceTerm, int]) -> tuple[ComplexArray, ComplexArray]:
@@ -421,29 +425,55 @@ class Answer(Protocol):
         ...
 
     def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
-        """Return the residual's change with the axis' own parameters, the joint and the coefficients, shape (2 n o, q + c), and the
-        model's change with the flange's receptance."""
+        """Return the residual's change with the axis' own parameters, the joint and the coefficients, shape (q + c, 2 n o), and that with
+        the flange's receptance, shape (n o, 3)."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AxisAnswer:
-    """One bending plane's lines, their gradient in kernel units, and the physics behind them."""
+    """One bending plane's lines, what their gradient is made of, and the physics behind them."""
 
     model: ComplexArray
-    gradient: ComplexArray
+    kept: FloatArray
+    factor: ComplexArray
     slope: ComplexArray
     axis: AxisParameters
     layout: AxisLayout
     joint: FloatArray
-    toolings: Sequence[ToolingAt] = ()
+    toolings: Sequence[ToolingAt]
 
     def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
-        core = self.layout.core
-        compliance = self.gradient[:, :, core - 3 : core].copy()
-        self.gradient[:, :, core - 3 : core] = compliance @ residual_turn(self.axis.residual)
-        scale = np.concatenate([chain(self.axis, self.layout), scaled_joint(np.log(self.joint))])
-        return lines.jacobian(self.gradient, self.model, self.slope, scale, self.toolings), compliance
+        axis, bare = self.axis, slice(self.layout.core - 3, self.layout.core)
+        n, o = self.model.shape
+        scale = np.concatenate([chain(axis, self.layout), self.joint[:JOINT]])
+        own, forces, holder = scale.size, self.slope.shape[1], HOLDER if self.toolings else 0
+        # first as it changes with the flange's receptance itself
+        scale[bare] = 1.0
+        root = -lines.root.reshape(n, o)
+        out = np.empty((own + max(forces, holder), 2 * n * o))
+        rows, weight = out[: own + holder], root * self.factor[:, None]
+        cross_frf_gradient(
+            axis.omega_n, axis.factor, axis.softening, self.joint, lines.shares, lines.points, self.kept, weight, scale, rows
+        )
+        compliance = _complex(out[bare])
+        out[bare] = (RESIDUAL_UNIT * residual_turn(axis.residual)).T @ out[bare]
+        with_holder = _complex(out[own : own + holder])
+        force_rows(self.slope, root * self.model, out[own : own + forces])
+        for each in self.toolings:
+            moved = with_holder.reshape(n, o, holder)[each.points, :, : each.values.shape[1]] @ each.slopes
+            place = (each.points[:, None] * o + np.arange(o)).ravel()
+            change = moved.reshape(place.size, -1).T
+            out[np.ix_(own + each.unknowns, place)] = change.real
+            out[np.ix_(own + each.unknowns, n * o + place)] = change.imag
+        return out[: own + forces], compliance
+
+
+def _complex(rows: FloatArray) -> ComplexArray:
+    """Rows of real and then imaginary parts, shape (q, 2 n), as complex columns, shape (n, q)."""
+    half = rows.shape[1] // 2
+    found: ComplexArray = (rows[:, :half] + 1j * rows[:, half:]).T
+    return found
 
 
 def _without_information(inner: FloatArray, period: FloatArray) -> None:

@@ -243,17 +243,15 @@ def new_modes(
     """
     linear = solution.evaluation.linear
     assert linear is not None
-    entries = linear.compliance[axes[0]].shape[2]
+    entries = linear.compliance[axes[0]].shape[1]
     directions = int(np.sqrt(2 * entries))
     place_hz = 2.0 * np.pi * np.geomspace(0.3 * band_hz[0], 2.5 * band_hz[1], PLACES)
     frequency, damping = np.tile(place_hz, len(NEW_DAMPING)), np.repeat(NEW_DAMPING, PLACES)
     rows = {}
     for i in axes:
-        omega, size = misfit.data.axes[i].omega[:, None], np.sqrt(misfit.weight(i))
+        omega = np.repeat(misfit.data.axes[i].omega, misfit.data.axes[i].outputs)[:, None]
         shape = 1.0 / (frequency**2 - omega**2 + 2j * damping * frequency * omega)
-        # change of the whitened lines, shape (n o, places, entries)
-        columns = -linear.compliance[i][:, :, None, :] * shape[:, None, :, None] * size[:, :, None, None]
-        columns = columns.reshape(-1, frequency.size * entries)
+        columns = (linear.compliance[i][:, None, :] * shape[:, :, None]).reshape(-1, frequency.size * entries)
         rows[i] = np.concatenate([columns.real, columns.imag])
     gradient, own, mixed = linear.border(rows, entries, solution.evaluation.residual)
     posterior = np.linalg.solve(solution.evaluation.hessian, np.column_stack([mixed, linear.gradient]))

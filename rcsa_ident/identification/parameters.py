@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -31,7 +32,7 @@ PLACE_UNIT = 1e-9
 JOINT = 4
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AxisLayout:
     """What of an axis is unknown.
 
@@ -51,28 +52,28 @@ class AxisLayout:
     softening: bool = False
     standstill: bool = False
 
-    @property
+    @cached_property
     def core(self) -> int:
         """Length of the part that describes the flange at the campaign's middle speed."""
         return 3 * self.modes + self.pairs + 3
 
-    @property
+    @cached_property
     def pairs(self) -> int:
         """Number of entries of a lower triangle over the modes."""
         return self.modes * (self.modes + 1) // 2
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of the axis' part of the vector."""
         return self.core + (self.modes + 2) * self.places + 2 * self.standstill + self.pairs * self.softening
 
-    @property
+    @cached_property
     def still(self) -> slice:
         """Places in the axis' part of what standing still changes."""
         first = self.core + (self.modes + 2) * self.places
         return slice(first, first + 2 * self.standstill)
 
-    @property
+    @cached_property
     def machine(self) -> np.ndarray:
         """Places in the axis' part of all that describes the flange while it turns: core and softening, but not the other places."""
         places = np.arange(self.size)
@@ -82,7 +83,6 @@ class AxisLayout:
 class Unknowns(ABC):
     """Which unknown stands where in a vector: those of machines first, then what all their lines share."""
 
-    __slots__ = ()
     #: Cutting coefficients whose scale is unknown, and clampings whose tooth angle at the trigger's edge is.
     coefficients: int
     clampings: int
@@ -101,28 +101,28 @@ class Unknowns(ABC):
     def axis(self, i: int) -> slice:
         """Return the part of the machines that the lines of an axis depend on."""
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of the vector."""
         return self.tail + JOINT + self.coefficients + self.clampings
 
-    @property
+    @cached_property
     def joint(self) -> slice:
         """Places of the logarithms of the joint's stiffnesses and damping."""
         return slice(self.tail, self.tail + JOINT)
 
-    @property
+    @cached_property
     def force(self) -> slice:
         """Places of the logarithms of the cutting coefficients' scales."""
         return slice(self.tail + JOINT, self.size - self.clampings)
 
-    @property
+    @cached_property
     def clamping(self) -> slice:
         """Places of the clampings' tooth angles [rad]."""
         return slice(self.size - self.clampings, self.size)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Layout(Unknowns):
     """Each axis has its own machine.
 
@@ -139,20 +139,24 @@ class Layout(Unknowns):
     coefficients: int = 0
     clampings: int = 0
 
-    @property
+    @cached_property
     def tail(self) -> int:
         """Place in the vector at which begins what all axes share."""
         return sum(a.size for a in self.axes)
 
-    @property
+    @cached_property
     def modes_of_axes(self) -> tuple[int, ...]:
         """Modes of each axis: those of one may be exchanged with each other without changing anything."""
         return tuple(a.modes for a in self.axes)
 
     def axis(self, i: int) -> slice:
         """Return the part of an axis."""
-        first = sum(a.size for a in self.axes[:i])
-        return slice(first, first + self.axes[i].size)
+        return self._places[i]
+
+    @cached_property
+    def _places(self) -> tuple[slice, ...]:
+        ends = list(accumulate((a.size for a in self.axes), initial=0))
+        return tuple(slice(first, last) for first, last in pairwise(ends))
 
 
 def planes(layout: Unknowns) -> Layout:

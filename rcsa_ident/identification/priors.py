@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -66,6 +66,11 @@ class Known(Protocol):
         ...
 
     @property
+    def information(self) -> FloatArray:
+        """jacobian^T jacobian, shape (p, p)."""
+        ...
+
+    @property
     def log_volume(self) -> float:
         """log det of the information matrix."""
         ...
@@ -75,7 +80,7 @@ class Known(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class PriorRows:
     """The priors as residuals of unit variance, (theta - centre) / spread, where a mode's damping follows its frequency.
 
@@ -96,6 +101,11 @@ class PriorRows:
     own: np.ndarray
     frequency: np.ndarray
     jacobian: FloatArray
+
+    @cached_property
+    def information(self) -> FloatArray:
+        """jacobian^T jacobian, shape (p, p)."""
+        return frozen(self.jacobian.T @ self.jacobian)
 
     @property
     def log_volume(self) -> float:

@@ -39,7 +39,7 @@ class SearchSettings:
 
     modes: int = 10
     population: int = 8
-    generations: int = 5
+    generations: int = 3
     steps: int = 8
 
 

@@ -13,7 +13,7 @@ import numpy as np
 LANES = 32
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@numba.njit(cache=True, error_model="numpy")
 def reduced_receptances(matrices, loads, omega, changes, values, slopes):
     """Fill `values` (n, p) with the receptances between flange and tip and, if it has rows, `slopes` (n, p, u) with their changes.
 

@@ -60,7 +60,7 @@ def coupled_information(data: IdentificationData, posterior: CoupledPosterior, m
     for i, (jacobian, columns, cut) in enumerate(zip(found.linear.jacobians, found.linear.columns, found.linear.cut, strict=True)):
         weight = misfit.root_weight(i)
         apart = [_stacked(-weight * (rival[i] - found.models[i])[:, 0]) for rival in rivals]
-        rows = np.column_stack([jacobian[:, :machine] @ whitened, *apart, jacobian[:, machine:] * spread, _stacked(columns[:, 0])])
+        rows = np.column_stack([jacobian[:machine].T @ whitened, *apart, jacobian[machine:].T * spread, _stacked(columns[:, 0])])
         n = cut.size
         for k in np.unique(cut):
             own = np.flatnonzero(cut == k)

@@ -40,7 +40,13 @@ class CoupledMisfit(Misfit):
         assert isinstance(layout, CoupledLayout)
         return coupled_prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
 
-    def _answers(self, theta: FloatArray, layout: Unknowns, normal: bool) -> Sequence[Answer]:
+    def _answers(self, theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
+        return self._answered(theta, layout, False)
+
+    def _with_slopes(self, answers: Sequence[Answer], theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
+        return self._answered(theta, layout, True)
+
+    def _answered(self, theta: FloatArray, layout: Unknowns, normal: bool) -> Sequence[Answer]:
         assert isinstance(layout, CoupledLayout)
         data, machine, logs = self.points_data, unpack(theta, layout), theta[layout.joint]
         named = len(self.data.coefficients)
@@ -112,7 +118,7 @@ class _CoupledAnswer:
     theta: FloatArray
 
     def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
-        """As in `Answer`; the flange's receptance is asked for its upper triangle by rows."""
+        """As in `Answer`; the flange's receptance is asked for its upper triangle by rows, shape (n o, 10)."""
         assert isinstance(layout, CoupledLayout)
         gradient = self.gradient
         if layout.skew:
@@ -122,7 +128,6 @@ class _CoupledAnswer:
         scale = np.concatenate([chain(self.machine, layout), scaled_joint(self.theta[layout.joint])])
         rows = gradient.reshape(-1, gradient.shape[2])
         extra = self.extra.reshape(rows.shape[0], -1)
-        out = np.empty((2 * rows.shape[0], rows.shape[1] + extra.shape[1]))
-        # a line's change with the coefficients is its parts', not a multiple of the line
-        whiten(rows, extra, np.ones(rows.shape[0], dtype=complex), lines.weight, scale, out)
-        return out, self.compliance
+        out = np.empty((rows.shape[1] + extra.shape[1], 2 * rows.shape[0]))
+        whiten(rows, extra, lines.weight, scale, out)
+        return out, self.compliance.reshape(rows.shape[0], -1) * -lines.root[:, None]

@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.identification._kernels import cross_frf
+from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
 from rcsa_ident.identification.coupled._kernels import LineArrays, MachineArrays, PointArrays, coupled_lines
 from rcsa_ident.identification.coupled.parameters import (
     EVERY_PAIR,
@@ -215,13 +215,14 @@ def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(o
         block = at.flange[own, d : d + 2, d : d + 2]
         holder = np.zeros((own.size, 8), dtype=complex)
         holder[:, :5] = np.stack([block[:, 0, 0], block[:, 0, 1], block[:, 1, 1], at.tip[own, d, i], at.tip[own, d + 1, i]], axis=1)
-        values = np.empty((own.size, outputs), dtype=complex)
-        size = layout.axes[i].size + 4
-        gradient = np.empty((own.size, outputs, size), dtype=complex)
+        size, half = layout.axes[i].size + 4, own.size * outputs
         points_of = np.stack([at.omega[own], at.x[own], np.ones(own.size), np.zeros(own.size)], axis=1)
         shares = FLANGE_ALONE if outputs == 1 else GAP_AND_FIXTURE
-        machine = plane_of.omega_n, plane_of.shapes, plane_of.factor, plane_of.softening, joint, shares
-        cross_frf(*machine, points_of, holder, values, gradient)
+        values, kept = cross_frf(plane_of.omega_n, plane_of.shapes, plane_of.factor, plane_of.softening, joint, shares, points_of, holder)
+        rows, weight = np.empty((size, 2 * half)), np.ones((own.size, outputs), dtype=complex)
+        machine = plane_of.omega_n, plane_of.factor, plane_of.softening, joint, shares
+        cross_frf_gradient(*machine, points_of, kept, weight, np.ones(size), rows)
+        gradient = (rows[:, :half] + 1j * rows[:, half:]).T.reshape(own.size, outputs, size)
         force = at.force[own, i, None]
         np.testing.assert_allclose(lines.parts[:, :, i], values * force, rtol=1e-12, atol=1e-13 * np.abs(values * force).max())
         # the other plane's force does nothing here

@@ -124,7 +124,7 @@ def test_two_planes_side_by_side_are_what_each_is_alone(tables, fixture):
 
 
 def test_compliance_is_the_change_with_the_flange(tables):
-    """What a new mode's promise is made of: d model / d the flange's receptance, its upper triangle by rows."""
+    """What a new mode's promise is made of: d residual / d the flange's receptance, its upper triangle by rows."""
     misfit, layout, theta = case(tables, CoupledLayout(3, True, True, 1, 1))
     here = misfit.evaluate(theta, layout, np.zeros((len(misfit.data.cut_ids), 2)), normal=True)
     factor = unpack(theta, layout).residual
@@ -136,8 +136,8 @@ def test_compliance_is_the_change_with_the_flange(tables):
         change = ((ahead @ ahead.T - behind @ behind.T) / 2e-4)[rows, cols]
         models = [misfit.models(theta + sign * step, layout) for sign in (1.0, -1.0)]
         for i in range(2):
-            difference = (models[0][i] - models[1][i]) / 2e-4
-            assert here.linear.compliance[i].shape[2] == 10
+            difference = -misfit.root_weight(i) * ((models[0][i] - models[1][i]) / 2e-4).ravel()
+            assert here.linear.compliance[i].shape[1] == 10
             np.testing.assert_allclose(here.linear.compliance[i] @ change, difference, atol=1e-6 * np.abs(difference).max())
     assert factor.shape == (4, 4)
 
