@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -50,9 +52,6 @@ if __name__ == "__main__":
 
 def worker(checkout: Path, campaign: Path, jobs: int) -> subprocess.Popen[str]:
     """Return a process that reads seeds and writes what came out, ready for the first; what is spawned imports its file anew."""
-    import os
-    import tempfile
-
     script = Path(tempfile.mkdtemp()) / "timed.py"
     script.write_text(WORKER)
     environment = {**os.environ, "PYTHONPATH": str(checkout), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -71,7 +70,8 @@ def ask(process: subprocess.Popen[str], seed: int) -> list[Any]:
 
 def main(given: list[str]) -> None:
     """Print a table, one row a checkout, number of jobs and seed."""
-    parser = argparse.ArgumentParser(prog="benchmarks identification", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="benchmarks identification", description=__doc__, formatter_class=raw)
     parser.add_argument("--against", type=Path, nargs="*", default=[], metavar="CHECKOUT", help="folders of other states of this project")
     parser.add_argument("--campaign", type=Path, default=HERE / "data" / "sample_runs", help="folder; default: the sample runs")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])

@@ -59,7 +59,7 @@ class PosedRobot(Machine):
     >>> joint = m.Joint("J1", m.Frame(), np.array([1.0, 0.0, 0.0]), rod, stiffness=1e6, damping=200.0)
     >>> arm = FlexibleRobot(m.RobotModel("one", (joint,), flange=m.Frame(offset=np.array([0.0, 0.0, 1.0]))))
     >>> print(PosedRobot(arm, [0.0]))
-    one at 0.0°: 1 mode from 39.5 Hz, tip.x, tip.y, tip.z
+    one at 0.0°: 1 mode from 39.2 Hz, tip.x, tip.y, tip.z
     """
 
     robot: FlexibleRobot
