@@ -28,6 +28,7 @@ CLAIMS = (
     "uploads",
     "published_modes",
     "bad_input",
+    "robot",
 )
 #: Each is a module with ``main(arguments)``.
 STUDIES = (

@@ -31,10 +31,13 @@ if TYPE_CHECKING:
     from rcsa_ident.io.forces import read_forces
     from rcsa_ident.io.lobes import read_lobes
     from rcsa_ident.io.recordings import read_recording
+    from rcsa_ident.io.robots import read_robot
     from rcsa_ident.io.setups import read_campaign, read_tooling
     from rcsa_ident.machine.known_tip import KnownTip
+    from rcsa_ident.machine.robot.flexible import FlexibleRobot
+    from rcsa_ident.machine.robot.posed_robot import PosedRobot
     from rcsa_ident.machining_setup import CutSpec, Tooling
-    from rcsa_ident.samples import sample_tooling
+    from rcsa_ident.samples import sample_robot, sample_tooling
     from rcsa_ident.signals.recording import Quantity, Sensor
     from rcsa_ident.stability.full_discretisation import FullDiscretisation
     from rcsa_ident.stability.lobes import stability_lobes
@@ -73,11 +76,13 @@ __all__ = [
     "CuttingCoefficients",
     "Dof",
     "Engagement",
+    "FlexibleRobot",
     "FullDiscretisation",
     "InputError",
     "KnownTip",
     "MillingProcess",
     "MultiFrequency",
+    "PosedRobot",
     "ProcessDamping",
     "Quantity",
     "Receptance",
@@ -106,12 +111,14 @@ __all__ = [
     "read_modes",
     "read_recording",
     "read_result",
+    "read_robot",
     "read_tap_tests",
     "read_tip",
     "read_tooling",
     "ring",
     "rpm",
     "sample_campaign",
+    "sample_robot",
     "sample_tooling",
     "stability_lobes",
     "stability_map",
@@ -135,10 +142,13 @@ _ROOMS = {
     "io.forces": ("read_forces",),
     "io.lobes": ("read_lobes",),
     "io.recordings": ("read_recording",),
+    "io.robots": ("read_robot",),
     "io.setups": ("read_campaign", "read_tooling"),
     "machine.known_tip": ("KnownTip",),
+    "machine.robot.flexible": ("FlexibleRobot",),
+    "machine.robot.posed_robot": ("PosedRobot",),
     "machining_setup": ("CutSpec", "Tooling"),
-    "samples": ("sample_tooling",),
+    "samples": ("sample_robot", "sample_tooling"),
     "signals.recording": ("Quantity", "Sensor"),
     "stability.full_discretisation": ("FullDiscretisation",),
     "stability.lobes": ("stability_lobes",),

@@ -11,8 +11,10 @@ import numpy as np
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import MachineFile, read_machine
+from rcsa_ident.io.robots import read_robot
 from rcsa_ident.io.setups import CAMPAIGN_FILE, read_tooling
 from rcsa_ident.io.simulations import Progress, SimulatedCampaign, write_simulation
+from rcsa_ident.machine.robot.model import RobotModel
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances, truth_speeds
 
@@ -51,11 +53,24 @@ def simulate_campaign(
 
 def sample_data() -> Path:
     """Return the folder of the virtual machines: inside an installed package, or the repository's ``data/machines``."""
+    return _carried("sample_data", "machines", "hpm.toml")
+
+
+def _carried(packed: str, folder: str, member: str) -> Path:
+    """Return where the package has a folder of the repository's data, known by one of its files."""
     package = Path(str(files("rcsa_ident")))
-    for folder in (package / "sample_data", package.parent / "data" / "machines"):
-        if (folder / "hpm.toml").is_file():
-            return folder
+    for found in (package / packed, package.parent / "data" / folder):
+        if (found / member).is_file():
+            return found
     raise InputError("sample data", "none beside the package", "an installed package, or a checkout of its repository", str(package))
+
+
+def sample_robot(name: str) -> RobotModel:
+    """Return a published arm: ``tx200``, ``kr210`` or ``kr500``, which has no masses."""
+    known = {path.stem: path for path in sorted(_carried("sample_robots", "robots", "tx200.toml").glob("*.toml"))}
+    if name not in known:
+        raise InputError("robot", name, f"one of {', '.join(known)}")
+    return read_robot(known[name])
 
 
 def sample_toolings() -> dict[str, Path]:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Coordinate
     from rcsa_ident.dynamics.uncertain import UncertainReceptance
+    from rcsa_ident.machine.machine import Machine
+    from rcsa_ident.workflows.tool_change import ToolChange
 
     Deviation = Mapping[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]
 
@@ -63,21 +65,37 @@ def tooltip(
 ) -> None:
     """Predict the tooltip FRF of any tooling on the identified machine: the tool's own, whatever gives way on the workpiece's side."""
     from rcsa_ident.errors import positive
-    from rcsa_ident.io.curves import write_tip_csv
-    from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.tool_change import tooltip as ask
 
     writable(out)
     spindle_speed = None if speed is None else from_rpm(positive("--speed", speed, "rev/min"))
     share = share_of(stiffness_spread, "--stiffness-spread", 50.0)
     machine = read_machine(result)
-    tool = read_tooling(tooling)
     last = to_hz(machine.band[1]) if to is None else to  # type: ignore[index]
     first = to_hz(machine.lowest) if from_ is None else from_
     frequency = inclusive(first, last, step, ("--from", "--to", "--step"), "Hz")
+    tell_tooltip(machine, tooling, out, frequency, spindle_speed, bands, share, relative, json_)
+
+
+def tell_tooltip(
+    machine: Machine,
+    tooling: Path,
+    out: Path,
+    frequency: FloatArray,
+    spindle_speed: float | None = None,
+    bands: bool = True,
+    stiffness_spread: float = 0.0,
+    relative: bool = False,
+    json_: bool = False,
+) -> None:
+    """Write the tooltip FRF of a tooling on a machine at frequencies [Hz], and print its peaks."""
+    from rcsa_ident.io.curves import write_tip_csv
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.tool_change import tooltip as ask
+
+    tool = read_tooling(tooling)
     stages = Stages(quiet=json_)
     with stages.stage("tooltip"):
-        found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, share, relative)
+        found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, stiffness_spread, relative)
         deviation = found.tip.deviation()
     write_tip_csv(out, found.tip)
     peaks = peaks_of(frequency, found.tip, deviation)
@@ -139,11 +157,6 @@ def lobes(
     json_: Json = False,
 ) -> None:
     """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
-    from rcsa_ident.io.lobes import write_lobes, write_map
-    from rcsa_ident.io.tested_cuts import read_tested_cuts, write_tests
-    from rcsa_ident.report.lobes import Judged
-    from rcsa_ident.workflows.tool_change import advise, map_of, probabilities_stable, surface_of
-
     writable(out)
     check_plot(plot)
     if tests_out is not None:
@@ -156,11 +169,33 @@ def lobes(
     change = change_of(machine, tooling, cut_of(cut, speeds.speed_variation), speeds, bands, stiffness_spread)
     if surface_depth_mm is not None and change.cut.feed_per_tooth is None:
         raise InputError("--surface-depth-mm", surface_depth_mm, "given together with --feed-per-tooth-mm")
+    surface_depth = None if surface_depth_mm is None else surface_depth_mm * 1e-3
+    tell_lobes(change, out, tests, tests_out, surface_depth, map_, map_depths, map_full, plot, json_)
+
+
+def tell_lobes(
+    change: ToolChange,
+    out: Path,
+    tests: Path | None = None,
+    tests_out: Path | None = None,
+    surface_depth: float | None = None,
+    map_: Path | None = None,
+    map_depths: int = 100,
+    map_full: bool = False,
+    plot: Path | None = None,
+    json_: bool = False,
+) -> None:
+    """Write and print the stability lobes of what is asked about, and what is recommended; options as of `lobes`, lengths in metres."""
+    from rcsa_ident.io.lobes import write_lobes, write_map
+    from rcsa_ident.io.tested_cuts import read_tested_cuts, write_tests
+    from rcsa_ident.report.lobes import Judged
+    from rcsa_ident.workflows.tool_change import advise, map_of, probabilities_stable, surface_of
+
     stages = Stages(quiet=json_)
     with stages.stage("lobes"):
         cuts = None if tests is None else read_tested_cuts(tests)
         advice = advise(change, tested=cuts)
-        surface = None if surface_depth_mm is None else surface_of(change, surface_depth_mm * 1e-3)
+        surface = None if surface_depth is None else surface_of(change, surface_depth)
     found, remarks = advice.lobes, [*advice.remarks, *([] if surface is None else surface.warnings)]
     chart = None
     if map_ is not None:

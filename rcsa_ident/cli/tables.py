@@ -34,6 +34,7 @@ from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.workflows.learn_from_cuts import NextTest
+    from rcsa_ident.workflows.robot_postures import RobotAtPosture
 
 #: Columns of a terminal that no cell reaches.
 _WIDEST = 10_000
@@ -364,4 +365,35 @@ def show_peaks(rows: Mapping[str, tuple[float, float, float, float]]) -> None:
     for axis, (frequency, magnitude, lowest, band) in rows.items():
         width = f"{1e6 * band:.4f}" if band == band else ""
         table.add_row(axis, f"{frequency:.0f}", f"{1e6 * magnitude:.4f}", width, f"{1e6 * lowest:.4f}")
+    show(table)
+
+
+def show_robot(found: RobotAtPosture, allowed: Sequence[bool]) -> None:
+    """Print where an arm's tool sits, how it vibrates and gives way, and all postures that bring it there, with those that are allowed."""
+    x, y, z = 1e3 * found.tool_point.offset
+    axis = ", ".join(f"{v:.3f}" for v in found.tool_point.turn[:, 2])
+    console().print(f"tool at {x:.1f}, {y:.1f}, {z:.1f} mm of the base, pointing along {axis}")
+    table = Table(title="Compliance at the tool, base's axes [µm/N]")
+    for name in ("", "x", "y", "z"):
+        table.add_column(name, justify="right")
+    for name, row in zip("xyz", 1e6 * found.compliance, strict=True):
+        table.add_row(name, *(f"{v:.3f}" for v in row))
+    show(table)
+    if found.natural_frequencies.size:
+        table = Table(title="Modes")
+        for name in ("frequency [Hz]", "damping [%]"):
+            table.add_column(name, justify="right")
+        for omega, ratio in zip(found.natural_frequencies[:12], found.damping_ratios[:12], strict=True):
+            table.add_row(f"{to_hz(omega):.2f}", f"{100.0 * ratio:.2f}")
+        show(table)
+        torques = ", ".join(f"{v:.0f}" for v in found.gravity_torques.round() + 0.0)
+        console().print(f"torques against the arm's weight: {torques} N m")
+    else:
+        console().print("no masses are known: no natural frequencies")
+    table = Table(title="Postures that bring the tool there [°]")
+    for k in range(found.postures.shape[1]):
+        table.add_column(f"{k + 1}", justify="right")
+    table.add_column("within limits")
+    for posture, within in zip(np.degrees(found.postures), allowed, strict=True):
+        table.add_row(*(f"{v:.2f}" for v in posture), "yes" if within else "no")
     show(table)

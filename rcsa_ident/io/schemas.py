@@ -16,6 +16,7 @@ from typing import Any
 
 from rcsa_ident.io.machines import machine_of
 from rcsa_ident.io.modes import modes_of
+from rcsa_ident.io.robots import robot_of
 from rcsa_ident.io.setups import SPREADS, campaign_of, tooling_of
 from rcsa_ident.io.validated_table import Asked, Table, listening
 from rcsa_ident.machining_setup import Tooling
@@ -171,6 +172,43 @@ _MODES = (
         "softening_sd_percent_per_1000_rpm": 1.0,
     },
 )
+_LINK: dict[str, Any] = {"mass_kg": 200.0}
+_TURNED = {"offset_mm": [0.0, 0.0, 500.0], "turn_deg": [90.0, 0.0, 0.0]}
+_WEIGHED = {"center_of_mass_mm": [0.0, 0.0, 250.0], "inertia_kg_m2": [20.0, 20.0, 5.0, 0.0, 0.0, 0.0]}
+_JOINT: dict[str, Any] = {"name": "J1", "axis": [0.0, 0.0, 1.0], "stiffness_nm_per_rad": 2e6}
+_ROBOTS: tuple[dict[str, Any], ...] = (
+    {"robot": {"name": "plain"}, "joints": [_JOINT | {"link": _LINK}]},
+    {
+        "robot": {"name": "all", "source": "a data sheet", "gravity_m_per_s2": [0.0, 0.0, -9.81], "base_mass_kg": 100.0},
+        "joints": [
+            _JOINT | _TURNED,
+            {
+                **_JOINT,
+                **_TURNED,
+                "name": "J2",
+                "limits_deg": [-120.0, 120.0],
+                "damping_nms_per_rad": 300.0,
+                "backlash_rad": 7e-5,
+                "gravity_compensated": True,
+                "link": _LINK | _WEIGHED,
+                "tilts": [
+                    {"axis": [1.0, 0.0, 0.0], "stiffness_nm_per_rad": 5e6},
+                    {"axis": [0.0, 1.0, 0.0], "stiffness_nm_per_rad": 5e6, "damping_nms_per_rad": 900.0},
+                ],
+            },
+        ],
+        "flange": dict(_TURNED),
+        "tool_point": dict(_TURNED),
+        "payload": _LINK | _WEIGHED,
+    },
+    {
+        "robot": {"name": "frames"},
+        "joints": [_JOINT | _TURNED | {"link": dict(_LINK)}, _JOINT | _TURNED],
+        "flange": {},
+        "tool_point": {},
+        "payload": dict(_LINK),
+    },
+)
 
 
 def _read_campaign(data: Mapping[str, Any]) -> object:
@@ -191,6 +229,7 @@ _FILES: dict[str, tuple[str, Callable[[Mapping[str, Any]], object], Iterable[Map
     "campaign": ("campaign.toml: sensors, workpiece, toolings, cuts and hammer tests", _read_campaign, _CAMPAIGNS),
     "machine": ("MACHINE.toml: a virtual machine", lambda data: machine_of(data, "", "machine", Path()), _MACHINES),
     "modes": ("MODES.toml: modes of the tip", lambda data: modes_of(data, ""), _MODES),
+    "robot": ("ROBOT.toml: an arm, its joints, links and springs", lambda data: robot_of(dict(data), ""), _ROBOTS),
 }
 SCHEMAS = tuple(_FILES)
 

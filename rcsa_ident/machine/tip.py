@@ -6,8 +6,9 @@ computed where they are asked for, and those of W, which are the same for every 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -264,47 +265,53 @@ class Behind:
 
     def _holder(self, side: Side, assembly: ToolAssembly, omega: FloatArray, highest: float) -> Holder | PlaneHolder:
         if side.axial:
-            return Holder(_rod(assembly, omega, highest))
+            return Holder(_cut(rod_poles(assembly, highest).receptance(omega).values, 1, 1))
         if self.turning is not None:
             return _turning_holder(assembly, omega, self.turning, side, self.slopes)
         poles = tool_holder_poles(assembly, highest)
         if side.single and not self.slopes:
             return PlaneHolder.of(poles.entries(omega, _ENTRIES))
-        planes = 1 if side.single else 2
-        free = poles.entries(omega, _ALL).T.reshape(-1, 4, 4)
-        kept = [0, 1, 2, 3] if self.slopes else [0, 2, 3]
-        free = free[:, kept][:, :, kept]
-        tip, flange = len(kept) - 2, 2
-        n, unit = omega.size, np.eye(planes)
-        a11, a12, a21, a22 = _cut(free, tip, flange)
-
-        def apart(block: ComplexArray) -> ComplexArray:
-            """Planes that the tool-holder does not couple."""
-            r, c = block.shape[1:]
-            return np.einsum("ab,nij->naibj", unit, block).reshape(n, planes * r, planes * c)
-
-        a11, a12, a21, a22 = apart(a11), apart(a12), apart(a21), apart(a22)
-        for dof in (c.dof for c in side.part.coordinates[2 * planes :]):
-            tips, across, back, own = _rod(assembly, omega, highest, dof is Dof.TORSION)
-            if dof is Dof.TORSION:
-                # what twists the tip is nobody's question
-                tips, across, back = tips[:, :0, :0], across[:, :0], back[:, :, :0]
-            a11, a12, a21, a22 = _beside(a11, tips), _beside(a12, across), _beside(a21, back), _beside(a22, own)
-        return Holder((a11, a12, a21, a22))
+        coordinates = side.part.coordinates
+        if len(coordinates) > 4:
+            return _whole_holder(assembly, omega.tobytes(), highest, coordinates[4:], self.slopes)
+        return Holder(_bending(assembly, omega, highest, 1 if side.single else 2, self.slopes))
 
 
-def _rod(
-    assembly: ToolAssembly, omega: FloatArray, highest: float, twisting: bool = False
+@lru_cache(maxsize=4)
+def _whole_holder(assembly: ToolAssembly, frequencies: bytes, highest: float, rods: tuple[Coordinate, ...], slopes: bool) -> Holder:
+    """A tool-holder in both planes, along its axis and about it, as far as these are asked for: the same at all postures of a robot."""
+    omega = np.frombuffer(frequencies)
+    parts = [_bending(assembly, omega, highest, 2, slopes)]
+    for dof in (c.dof for c in rods):
+        tips, across, back, own = _cut(rod_poles(assembly, highest, dof is Dof.TORSION).receptance(omega).values, 1, 1)
+        if dof is Dof.TORSION:
+            # what twists the tip is nobody's question
+            tips, across, back = tips[:, :0, :0], across[:, :0], back[:, :, :0]
+        parts.append((tips, across, back, own))
+    a11, a12, a21, a22 = (_beside(each) for each in zip(*parts, strict=True))
+    return Holder((a11, a12, a21, a22))
+
+
+def _bending(
+    assembly: ToolAssembly, omega: FloatArray, highest: float, planes: int, slopes: bool
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-    """A11, A12, A21, A22 of a tool-holder along its axis, or of its twist."""
-    return _cut(rod_poles(assembly, highest, twisting).receptance(omega).values, 1, 1)
+    """A11, A12, A21, A22 of a tool-holder in one or both bending planes, which it does not couple."""
+    free = tool_holder_poles(assembly, highest).entries(omega, _ALL).T.reshape(-1, 4, 4)
+    kept = [0, 1, 2, 3] if slopes else [0, 2, 3]
+    a11, a12, a21, a22 = ([each] * planes for each in _cut(free[:, kept][:, :, kept], len(kept) - 2, 2))
+    return _beside(a11), _beside(a12), _beside(a21), _beside(a22)
 
 
-def _beside(one: ComplexArray, other: ComplexArray) -> ComplexArray:
-    """Blocks of directions that feel nothing of each other, shapes (n, a, b) and (n, c, d) -> (n, a + c, b + d)."""
-    (n, a, b), (_, c, d) = one.shape, other.shape
-    both = np.zeros((n, a + c, b + d), dtype=complex)
-    both[:, :a, :b], both[:, a:, b:] = one, other
+def _beside(blocks: Sequence[ComplexArray]) -> ComplexArray:
+    """Blocks of directions that feel nothing of each other, shapes (n, a, b), (n, c, d), ... -> (n, a + c + ..., b + d + ...)."""
+    if len(blocks) == 1:
+        return blocks[0]
+    both = np.zeros((len(blocks[0]), sum(each.shape[1] for each in blocks), sum(each.shape[2] for each in blocks)), dtype=complex)
+    row = col = 0
+    for each in blocks:
+        rows, cols = each.shape[1:]
+        both[:, row : row + rows, col : col + cols] = each
+        row, col = row + rows, col + cols
     return both
 
 

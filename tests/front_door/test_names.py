@@ -15,11 +15,13 @@ from tests.fixtures.paths import ROOT
 #: Promised: a name that is taken away here is taken away from every script.
 NAMES = [
     "MATERIALS", "BeamSegment", "Contact", "Coordinate", "CutSpec", "Cutter", "CuttingCoefficients", "Dof", "Engagement",
-    "FullDiscretisation", "InputError", "KnownTip", "MillingProcess", "MultiFrequency", "ProcessDamping", "Quantity",
+    "FlexibleRobot", "FullDiscretisation", "InputError", "KnownTip", "MillingProcess", "MultiFrequency", "PosedRobot",
+    "ProcessDamping", "Quantity",
     "Receptance", "SemiDiscretisation", "Sensor", "SpeedVariation", "SpindleDrive", "TimeDomain", "TipModes", "Tooling",
     "ZeroOrder", "advise", "clamped", "connect", "estimate_forces", "hz", "identify", "listen", "material", "normal_modes", "plot_lobes",
-    "read_campaign", "read_forces", "read_lobes", "read_machine", "read_modes", "read_recording", "read_result", "read_tap_tests",
-    "read_tip", "read_tooling", "ring", "rpm", "sample_campaign", "sample_tooling", "stability_lobes", "stability_map",
+    "read_campaign", "read_forces", "read_lobes", "read_machine", "read_modes", "read_recording", "read_result", "read_robot",
+    "read_tap_tests",
+    "read_tip", "read_tooling", "ring", "rpm", "sample_campaign", "sample_robot", "sample_tooling", "stability_lobes", "stability_map",
     "surface_location_error", "tap",
 ]  # fmt: skip
 

@@ -26,8 +26,9 @@ def test_the_wheel_carries_what_a_checkout_has(tmp_path, monkeypatch):
     """Of a checkout the folder of its machines; in an installed package the copy that the wheel's settings ask for."""
     assert samples.sample_data() == MACHINES
     wheel = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
-    ((source, target),) = wheel["force-include"].items()
+    (source, target), (arms, packed) = wheel["force-include"].items()
     assert ROOT / source == MACHINES
+    assert (arms, packed) == ("data/robots", "rcsa_ident/sample_robots")
     installed = tmp_path / target
     installed.mkdir(parents=True)
     (installed / "hpm.toml").touch()
@@ -36,6 +37,12 @@ def test_the_wheel_carries_what_a_checkout_has(tmp_path, monkeypatch):
     (installed / "hpm.toml").unlink()
     with pytest.raises(ri.InputError, match="sample data"):
         samples.sample_data()
+
+
+def test_published_arms():
+    assert [ri.sample_robot(name).name for name in ("tx200", "kr210", "kr500")] == ["Stäubli TX200", "KUKA KR210", "KUKA KR500 R2830"]
+    with pytest.raises(ri.InputError, match="one of kr210, kr500, tx200"):
+        ri.sample_robot("scara")
 
 
 @pytest.mark.slow

@@ -24,13 +24,13 @@ _BETWEEN_KEYS = re.compile(
     r"above from_hz|where there are cuts|at least one tooling|hammer tests \[\[frfs\]\], or both|"
     r"a point of the tool-holder, tip or mm|one or more speeds|\[\[z\]\] or several of them|"
     r"stickout|insertion|softening|settling|from.*to|without it the cut keeps its speed|of change in each pass|"
-    r"times the value|of a value that is not given|radial_mpa"
+    r"times the value|of a value that is not given|radial_mpa|a vector of three that is not zero|then a higher one|are these millimetres"
 )
 
 
 def _examples():
     for path in sorted((ROOT / "data").rglob("*.toml")):
-        name = "campaign" if path.name == "campaign.toml" else "tooling" if path.parent.name == "toolings" else "machine"
+        name = "campaign" if path.name == "campaign.toml" else {"toolings": "tooling", "robots": "robot"}.get(path.parent.name, "machine")
         yield name, path
 
 
@@ -104,7 +104,10 @@ def test_every_example_is_valid(name, path):
     assert jsonschema_rs.validator_for(schema_of(name)).is_valid(rtoml.loads(path.read_text("utf-8")))
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "data" / "machines").rglob("*.toml")), ids=lambda p: p.name)
+_NAMING = [path for folder in ("machines", "robots") for path in sorted((ROOT / "data" / folder).rglob("*.toml"))]
+
+
+@pytest.mark.parametrize("path", _NAMING, ids=lambda p: p.name)
 def test_the_schema_that_an_example_names_is_there_and_its_readers(path):
     first = path.read_text("utf-8").splitlines()[0]
     named = path.parent / first.removeprefix("#:schema ")

@@ -116,7 +116,10 @@ def postures_of(robot: RobotModel, flange: Frame, within_limits: bool = True) ->
     ]
     limits = [j.limits if within_limits else (-np.pi, np.pi) for j in robot.joints]
     kept = np.array([[turned_within(a, limit) for a, limit in zip(each, limits, strict=True)] for each in found]).reshape(-1, 6)
-    return kept[np.all(np.isfinite(kept), axis=1)]
+    kept = kept[np.all(np.isfinite(kept), axis=1)]
+    # where the wrist is stretched, both of its solutions are one
+    alike = np.array([[np.max(np.abs(a - b), initial=0.0) < _CROSSING for b in kept] for a in kept]).reshape(len(kept), len(kept))
+    return kept[~np.any(np.tril(alike, -1), axis=1)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,215 @@
+"""robot: what an arm does at a posture and along a path, and what a tool on it may cut."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.conditions import change_of, cut_of
+from rcsa_ident.cli.lobes import Plot, ToolingFile, check_plot, tell_lobes, tell_tooltip
+from rcsa_ident.cli.options import CutOptions, SpeedOptions, takes_groups
+from rcsa_ident.errors import InputError
+from rcsa_ident.units import from_hz, inclusive, to_hz, to_rpm
+
+if TYPE_CHECKING:
+    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.machine.robot.flexible import FlexibleRobot
+    from rcsa_ident.machine.robot.posed_robot import PosedRobot
+
+RobotFile = Annotated[Path, typer.Argument(help="ROBOT.toml of an arm; three stand in data/robots.", show_default=False)]
+Posture = Annotated[
+    str, typer.Option(metavar="'Q1 Q2 ...'", help="Angles of the joints, degrees, as ROBOT.toml counts them.", show_default=False)
+]
+JointsOnly = Annotated[
+    bool, typer.Option("--joints-only", help="Leave the springs across the joints' axes out: the drives alone give way.")
+]
+
+robot_app = typer.Typer(
+    help="Milling robots: natural frequencies, tooltip FRFs and stability lobes at a posture and along a path.", no_args_is_help=True
+)
+
+
+@answers
+def check(
+    robot: RobotFile,
+    posture: Annotated[
+        str | None,
+        typer.Option(metavar="'Q1 Q2 ...'", help="Angles of the joints, degrees; default: all zero.", show_default=False),
+    ] = None,
+    joints_only: JointsOnly = False,
+    json_: Json = False,
+) -> None:
+    """Say where an arm's tool sits at a posture, how it vibrates and gives way there, and what speaks against its description."""
+    import numpy as np
+
+    from rcsa_ident.workflows.robot_postures import at_posture
+
+    arm = _arm(robot, joints_only)
+    angles = np.zeros(len(arm.model.joints)) if posture is None else _angles(posture, arm)
+    found = at_posture(arm, angles)
+    warnings = [*arm.model.beyond_limits(angles), *arm.model.warnings]
+    if json_:
+        emit(
+            {
+                "name": arm.model.name,
+                "degrees_of_freedom": arm.model.freedoms(arm.tilts),
+                "mass_kg": arm.model.mass if arm.model.weighed else None,
+                "tcp_m": found.tool_point.offset.tolist(),
+                "tcp_axes": found.tool_point.turn.tolist(),
+                "natural_frequencies_hz": to_hz(found.natural_frequencies).tolist(),
+                "damping_ratios": found.damping_ratios.tolist(),
+                "gravity_torque_nm": found.gravity_torques.tolist(),
+                "tcp_compliance_m_per_n": found.compliance.tolist(),
+                "postures_deg": np.degrees(found.postures).tolist(),
+                "warnings": warnings,
+            }
+        )
+        return
+    from rcsa_ident.cli.tables import show_robot
+
+    say(f"{arm.model.name}: {len(arm.model.joints)} joints, {arm.model.freedoms(arm.tilts)} freedoms")
+    show_robot(found, [not arm.model.beyond_limits(each) for each in found.postures])
+    for warning in warnings:
+        warn(warning)
+
+
+@answers
+def tip(
+    robot: RobotFile,
+    tooling: ToolingFile,
+    posture: Posture,
+    out: Annotated[Path, typer.Option(help="FRF.csv to write, m/N.", show_default=False)],
+    joints_only: JointsOnly = False,
+    from_: Annotated[float, typer.Option("--from", help="Lowest frequency, Hz.")] = 1.0,
+    to: Annotated[float, typer.Option("--to", help="Highest frequency, Hz.")] = 4500.0,
+    step: Annotated[float, typer.Option(help="Frequency step, Hz.")] = 0.25,
+    json_: Json = False,
+) -> None:
+    """Predict the tooltip FRF of a tooling on an arm at a posture, along the tool's x, its y turned around, and into the spindle."""
+    writable(out)
+    machine = replace(_posed(robot, posture, joints_only), highest=from_hz(to))
+    tell_tooltip(machine, tooling, out, inclusive(from_, to, step, ("--from", "--to", "--step"), "Hz"), json_=json_)
+
+
+@answers
+@takes_groups
+def lobes(
+    robot: RobotFile,
+    tooling: ToolingFile,
+    posture: Posture,
+    out: Annotated[Path, typer.Option(help="LOBES.csv to write.", show_default=False)],
+    cut: CutOptions,
+    speeds: SpeedOptions,
+    joints_only: JointsOnly = False,
+    plot: Plot = None,
+    json_: Json = False,
+) -> None:
+    """Compute stability lobes of a tooling on an arm at a posture; --feed-direction turns the feed from the tool's x."""
+    from rcsa_ident.io.setups import read_tooling
+
+    writable(out)
+    check_plot(plot)
+    machine = _posed(robot, posture, joints_only)
+    change = change_of(machine, read_tooling(tooling), cut_of(cut, speeds.speed_variation), speeds, False, 0.0)
+    tell_lobes(change, out, plot=plot, json_=json_)
+
+
+@answers
+@takes_groups
+def map_(
+    robot: RobotFile,
+    tooling: ToolingFile,
+    posture: Annotated[
+        str,
+        typer.Option(
+            metavar="'Q1 Q2 ...'",
+            help="Angles near those of the first place, degrees: of all postures that reach it the nearest one is taken.",
+            show_default=False,
+        ),
+    ],
+    path: Annotated[
+        Path, typer.Option(help="PATH.csv of the tool's tip: x_mm, y_mm, z_mm, and i, j, k of the tool's axis.", show_default=False)
+    ],
+    out: Annotated[Path, typer.Option(help="MAP.csv to write: a limit for each place and speed.", show_default=False)],
+    cut: CutOptions,
+    speeds: SpeedOptions,
+    joints_only: JointsOnly = False,
+    json_: Json = False,
+) -> None:
+    """Compute the stability limit at every place of a path and every speed: where on a part an arm may cut how deep."""
+    import numpy as np
+
+    from rcsa_ident.io.paths import read_path, write_limits_along
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.robot_postures import following, limits_along
+
+    writable(out)
+    machine, tool = _posed(robot, posture, joints_only), read_tooling(tooling)
+    places, axes = read_path(path)
+    change = change_of(machine, tool, cut_of(cut, speeds.speed_variation), speeds, False, 0.0)
+    stages = Stages(quiet=json_)
+    postures = following(machine.robot.model, machine.angles, places, axes, tool.assembly)
+    with stages.stage("limits") as line:
+        limits, chatter = limits_along(change, postures, line)
+    write_limits_along(out, places, change.speeds, limits, chatter)
+    # the depth that every place allows, and the speed at which that is most
+    worst = np.min(limits, axis=0)
+    best = int(np.argmax(worst))
+    depth = None if not math.isfinite(worst[best]) else 1e3 * float(worst[best])
+    if json_:
+        emit(
+            {
+                "positions": len(places),
+                "postures_deg": np.degrees(postures).tolist(),
+                "best_speed_rpm": to_rpm(float(change.speeds[best])),
+                "limit_everywhere_mm": depth,
+                "warnings": list(machine.remarks),
+                "seconds": stages.seconds,
+                "out": str(out),
+            }
+        )
+        return
+    told = f"deeper than {1e3 * change.max_depth:g} mm" if depth is None else f"{depth:.2f} mm"
+    say(f"at {to_rpm(float(change.speeds[best])):.0f} rev/min every place is stable up to {told}")
+    for remark in machine.remarks:
+        warn(remark)
+    say(f"written: {out} ({len(places)} places, {change.speeds.size} speeds, {stages.seconds['limits']:.2f} s)")
+
+
+def _arm(path: Path, joints_only: bool) -> FlexibleRobot:
+    from rcsa_ident.io.robots import read_robot
+    from rcsa_ident.machine.robot.flexible import FlexibleRobot
+
+    return FlexibleRobot(read_robot(path), tilts=not joints_only)
+
+
+def _posed(path: Path, posture: str, joints_only: bool) -> PosedRobot:
+    from rcsa_ident.machine.robot.posed_robot import PosedRobot
+
+    arm = _arm(path, joints_only)
+    return PosedRobot(arm, _angles(posture, arm))
+
+
+def _angles(text: str, arm: FlexibleRobot) -> FloatArray:
+    """The posture of an option, in radians."""
+    import numpy as np
+
+    count = len(arm.model.joints)
+    try:
+        found = [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        found = []
+    if len(found) != count or not all(math.isfinite(each) for each in found):
+        raise InputError("--posture", text, f"{count} angles with blanks between, one a joint [°]")
+    if max(abs(each) for each in found) > 720.0:
+        raise InputError("--posture", text, "angles within two turns [°]")
+    return np.radians(found)
+
+
+#: By their names on the command line.
+COMMANDS: dict[str, Any] = {"check": check, "tip": tip, "lobes": lobes, "map": map_}
