@@ -14,6 +14,7 @@ from rich.table import Table
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
+from rcsa_ident.identification.robot_joints import JointFit
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.report.summaries import (
     DrawingRow,
@@ -396,4 +397,19 @@ def show_robot(found: RobotAtPosture, allowed: Sequence[bool]) -> None:
     table.add_column("within limits")
     for posture, within in zip(np.degrees(found.postures), allowed, strict=True):
         table.add_row(*(f"{v:.2f}" for v in posture), "yes" if within else "no")
+    show(table)
+
+
+def show_joints(names: Sequence[str], found: JointFit, explained: Mapping[str, FloatArray]) -> None:
+    """Print what was found of an arm's joints, and the explained share of each motion."""
+    table = Table(title="Joints")
+    heads = ("joint", "stiffness [MN m/rad]", "± [%]", "lost motion [µrad]", "friction [N m]", "and [N m s/rad]")
+    for name in (*heads, *(f"{record}: explained [%]" for record in explained)):
+        table.add_column(name, justify="left" if name == "joint" else "right")
+    for i, name in enumerate(names):
+        numbers = (
+            f"{1e-6 * found.stiffness[i]:.2f}", f"{100.0 * found.stiffness_share[i]:.0f}", f"{1e6 * found.lost_motion[i]:.0f}",
+            f"{found.coulomb[i]:.0f}", f"{found.viscous[i]:.0f}", *(f"{100.0 * share[i]:.1f}" for share in explained.values()),
+        )  # fmt: skip
+        table.add_row(name, *("" if text == "nan" else text for text in numbers))
     show(table)

@@ -58,14 +58,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None, 
     time : str or None
         Name of the vector of times, where the file's names do not tell it.
     """
-    with _tables(path) as tables:
+    with tables_of(path) as tables:
         return _read(tables, names, default_rate, time, str(path))
 
 
 def told_channels(path: Path) -> list[tuple[str, str]]:
     """Return the vectors of numbers on the root, and the signals of its matrices, but times and rates, each with an empty unit."""
     found: list[tuple[str, str]] = []
-    with _tables(path) as tables:
+    with tables_of(path) as tables:
         for name in tables.names(""):
             if name in (*TIME_COLUMNS, "t", *RATES):
                 continue
@@ -80,7 +80,7 @@ def told_channels(path: Path) -> list[tuple[str, str]]:
 
 
 @contextmanager
-def _tables(path: Path) -> Iterator[Tables]:
+def tables_of(path: Path) -> Iterator[Tables]:
     """What a file of either version tells."""
     where = str(path)
     with existing_file(path, "recording", 1 << 62).open("rb") as file:

@@ -9,9 +9,11 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
 from rcsa_ident.io.curves import read_frf_csv
+from rcsa_ident.io.robots import read_robot
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
+from tests.fixtures import moving_arm
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.robots import ROBOTS, TABLE_7, robot
 
@@ -153,3 +155,42 @@ def test_a_bad_path_is_named(text, message, tmp_path):
     assert found.exit_code == 2
     assert message in found.output
     assert not out.exists()
+
+
+def written(record, path):
+    """A record as CSV, the motors' own inertia taken out of the torques."""
+    acceleration = np.gradient(np.gradient(record.motor, record.step, axis=1), record.step, axis=1)
+    torque = record.torque - record.motor_inertia[:, None] * acceleration
+    columns = {"time_s": np.arange(record.motor.shape[1]) * record.step}
+    for what, unit, rows in (
+        ("motor", "deg", np.degrees(record.motor)),
+        ("joint", "deg", np.degrees(record.joint)),
+        ("torque", "nm", torque),
+    ):
+        columns |= {f"{what}_{k + 1}_{unit}": row for k, row in enumerate(rows)}
+    np.savetxt(path, np.array([*columns.values()]).T, delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+def test_identify_from_encoders(tmp_path):
+    first, other = (written(moving_arm.record(name, seed), tmp_path / f"{name}.csv") for name, seed in (("A", 11), ("B", 12)))
+    out = tmp_path / "FOUND.toml"
+    found = run("robot", "identify", ROBOTS / "kr210.toml", first, "--check", other, "--out", out, "--json")
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    np.testing.assert_allclose(told["stiffness_nm_per_rad"][:3], moving_arm.STIFFNESS[:3], rtol=0.2)
+    assert told["delay_ms"] == pytest.approx(1e3 * moving_arm.LATE, abs=0.06)
+    assert min(told["explained"]["B.csv"][:3]) > 0.95
+    arm = read_robot(out)
+    np.testing.assert_allclose([j.stiffness for j in arm.joints[:3]], told["stiffness_nm_per_rad"][:3], rtol=1e-5)
+    # what was not told is as it was
+    before = robot("kr210")
+    left = [i for i in range(6) if told["stiffness_nm_per_rad"][i] is None]
+    assert left
+    assert [arm.joints[i].stiffness for i in left] == [before.joints[i].stiffness for i in left]
+    assert len(told["warnings"]) == len(left)
+    words = run("robot", "identify", ROBOTS / "kr210.toml", first, "--out", out)
+    assert "after the motors'" in words.output
+    refused = run("robot", "identify", ROBOTS / "kr210.toml", tmp_path, "--out", tmp_path / "no.toml")
+    assert refused.exit_code == 2
+    assert "stiffness from cuts is not there yet" in refused.output

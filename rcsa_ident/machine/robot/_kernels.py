@@ -195,3 +195,28 @@ def solve_symmetric(matrix, right):
         for k in range(j + 1, n):
             right[j] -= matrix[k, j] * right[k]
         right[j] /= matrix[j, j]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def point_torques(turn, offset, axis, angles, rate, acceleration, gravity, link, place, out):
+    """Fill the torques (p, n, t) that points of unit mass ask of the joints along a motion.
+
+    Parameters
+    ----------
+    turn, offset, axis : of a chain
+    angles, rate, acceleration : (t, n)
+    gravity : (3,)
+    link : (p,) frame that each point belongs to; place : (p, 3) in it
+    """
+    n = axis.shape[0]
+    rotation, origin, direction = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 3))
+    mass, centre, inertia, torque = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3, 3)), np.empty(n)
+    for t in range(angles.shape[0]):
+        frames(turn, offset, axis, angles[t], rotation, origin, direction)
+        for p in range(link.size):
+            mass[link[p]] = 1.0
+            centre[link[p]] = place[p]
+            inverse_dynamics(rotation, origin, direction, mass, centre, inertia, rate[t], acceleration[t], gravity, torque)
+            mass[link[p]] = 0.0
+            for k in range(n):
+                out[p, k, t] = torque[k]

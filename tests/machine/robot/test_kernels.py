@@ -1,11 +1,14 @@
 """The kernels of the robot against sums over bodies and differences; these tests run again without the compiler."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rcsa_ident.machine.robot import _kernels as kernels
 from rcsa_ident.machine.robot.inertia import accelerations, mass_matrix, torques
 from rcsa_ident.machine.robot.kinematics import posed
+from rcsa_ident.machine.robot.model import Body
 from tests.fixtures.robots import robot
 from tests.oracles import multibody
 
@@ -122,3 +125,18 @@ def test_compiled_and_plain_agree(monkeypatch):
             monkeypatch.setattr(kernels, name, plain)
     for one, other in zip(compiled, all_of_it(), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
+
+
+def test_points_of_unit_mass_weigh_as_bodies_do():
+    """The torques of an arm whose links are points are the sum of theirs."""
+    arm, rng = robot("kr210"), np.random.default_rng(9)
+    place, weight = rng.uniform(-0.5, 0.5, (6, 3)), rng.uniform(10.0, 100.0, 6)
+    points = tuple(replace(j, body=Body(m, p)) for j, m, p in zip(arm.joints, weight, place, strict=True))
+    angles, rate, acceleration = rng.uniform(-2.0, 2.0, (3, 4, 6))
+    own = posed(arm, angles[0]).chain
+    out = np.empty((6, 6, 4))
+    kernels.point_torques(own.turn, own.offset, own.axis, angles, rate, acceleration, GRAVITY, np.arange(6), place, out)
+    light = arm.changed(joints=points)
+    for t in range(4):
+        expected = torques(posed(light, angles[t]), rate[t], acceleration[t], GRAVITY)
+        np.testing.assert_allclose(weight @ out[:, :, t], expected, rtol=1e-10, atol=1e-10 * np.abs(expected).max())
