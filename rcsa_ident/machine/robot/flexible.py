@@ -61,12 +61,12 @@ class FlexibleRobot:
         """
         chain = posed(self.model, posture, self.tilts)
         tool = chain.flange.then(self.model.tool_point).then(Frame(_about_z(turn)))
-        return _structure(chain, tool.offset, tool.turn @ _INTO_SPINDLE, _DIRECTIONS)
+        return _structure(chain, tool.offset, tool.turn @ _INTO_SPINDLE)
 
     def bare(self, posture: FloatArray) -> Structure:
-        """Return the structure at the robot's flange in the base's axes, nothing hanging on it; turns, not slopes, behind x, y and z."""
+        """Return the structure at the robot's own flange, in the base's axes, nothing hanging on it."""
         chain = posed(self.model, posture, self.tilts, payload=False)
-        return _structure(chain, chain.flange.offset, np.eye(3), np.eye(6))
+        return _structure(chain, chain.flange.offset, np.eye(3))
 
 
 def modes_of(structure: Structure) -> tuple[FloatArray, FloatArray]:
@@ -79,11 +79,11 @@ def modes_of(structure: Structure) -> tuple[FloatArray, FloatArray]:
     return omega, np.einsum("im,ij,jm->m", shapes, structure.damping, shapes) / (2.0 * omega)
 
 
-def _structure(chain: PosedChain, point: FloatArray, axes: FloatArray, directions: FloatArray) -> Structure:
+def _structure(chain: PosedChain, point: FloatArray, axes: FloatArray) -> Structure:
     if chain.chain.mass[-1] <= 0.0:
         raise InputError("link masses", "nothing", "mass, centre and inertia of the links: without them nothing vibrates")
     motion = chain.jacobian(point)
-    seen = directions @ np.concatenate([axes.T @ motion[:3], axes.T @ motion[3:]])
+    seen = _DIRECTIONS @ np.concatenate([axes.T @ motion[:3], axes.T @ motion[3:]])
     mass = mass_matrix(chain)
     damping, stiffness = np.diag(chain.chain.damping), np.diag(chain.chain.stiffness)
     return Structure(mass, damping, stiffness, np.zeros_like(mass), WHOLE_FLANGE, shapes=seen.T)
