@@ -147,16 +147,21 @@ def axial(
     kept = (frequency >= positive("--from", from_, "Hz")) & (frequency <= (math.inf if to is None else positive("--to", to, "Hz")))
     learnt = axial_flange_from_tap(tapped, from_hz(frequency[kept]), values[kept])
     if measured:
-        write_flange_machine(out, replace(read_flange_machine(result), axial=learnt))
+        machine = read_flange_machine(result)
+        band = machine.band
+        write_flange_machine(out, replace(machine, axial=learnt))
     else:
-        write_result(out, read_identified(result)[1] | {"axial": axial_to_json(learnt)})
+        identified, told = read_identified(result)
+        band = identified.band
+        write_result(out, told | {"axial": axial_to_json(learnt)})
+    remarks = learnt.remarks(band)
     tip = learnt.receptance(from_hz(frequency[kept])).values[:, 0, 0]
     stiffness = float(1.0 / np.abs(tip[0]))
     if json_:
-        emit({"axial": axial_to_json(learnt), "stiffness_n_per_m": stiffness, "warnings": list(learnt.remarks), "out": str(out)})
+        emit({"axial": axial_to_json(learnt), "stiffness_n_per_m": stiffness, "warnings": list(remarks), "out": str(out)})
         return
     say(f"{learnt}; {1e-6 * stiffness:.3g} N/µm at {frequency[kept][0]:.0f} Hz")
-    for remark in learnt.remarks:
+    for remark in remarks:
         warn(remark)
     say(f"written: {out}")
 

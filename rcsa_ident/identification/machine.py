@@ -177,7 +177,7 @@ class IdentifiedMachine(Machine):
         """What speaks against everything that is computed with it."""
         doubts = () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
         words = "" if self.workpiece_side is None else self.workpiece_side.words
-        along = () if self.axial is None else self.axial.remarks
+        along = () if self.axial is None else self.axial.remarks(self.band)
         return (*doubts, *([words] if words else []), *along)
 
     def posteriors(self) -> dict[Dof, Posterior]:

@@ -23,6 +23,8 @@ AXIAL = (Coordinate("flange", Dof.Z),)
 _TOLERANCE, _DAMPED_OUTSIDE = 1e-3, 0.1
 #: Share of the frequencies at which it may feed energy in before that is said, and how much of its magnitude that is.
 _MOST_ACTIVE, _ACTIVE = 0.05, 0.02
+#: A machine that is known so much below or above what was tapped, as a share of the tap's ends, is said.
+_SHORT_BELOW, _SHORT_ABOVE = 0.8, 1.05
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -85,17 +87,29 @@ class AxialFlange(Shown):
         """Return the receptance over ``flange.z``, shape (n, 1, 1)."""
         return Receptance(omega, self.modes.response(omega), AXIAL, AXIAL)
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What speaks against it: a flange that feeds energy in."""
+    def remarks(self, band: tuple[float, float] | None) -> tuple[str, ...]:
+        """Return what speaks against it: a flange that feeds energy in, or one that was tapped over less than the machine's band.
+
+        Parameters
+        ----------
+        band : (float, float) or None [rad/s]
+            At which the machine is known.
+        """
+        told = []
+        low, high = (to_hz(w) for w in self.band)
+        if band is not None and (to_hz(band[0]) < _SHORT_BELOW * low or to_hz(band[1]) > _SHORT_ABOVE * high):
+            told.append(
+                f"along the axis it was tapped from {low:.0f} to {high:.0f} Hz, the machine is known from {to_hz(band[0]):.0f} to "
+                f"{to_hz(band[1]):.0f} Hz: between them nothing but the poles that were found says how the axis moves"
+            )
         values = self.modes.response(np.linspace(*self.band, 500))[:, 0, 0]
         share = float(np.mean(values.imag > _ACTIVE * np.abs(values)))
-        if share <= _MOST_ACTIVE:
-            return ()
-        return (
-            f"along the axis the flange would feed energy in at {100.0 * share:.0f} % of the frequencies: the tap's calibration or sign, "
-            "or the drawing of the tooling that was tapped, is wrong",
-        )
+        if share > _MOST_ACTIVE:
+            told.append(
+                f"along the axis the flange would feed energy in at {100.0 * share:.0f} % of the frequencies: the tap's calibration or "
+                "sign, or the drawing of the tooling that was tapped, is wrong"
+            )
+        return tuple(told)
 
     def __str__(self) -> str:
         low, high = (to_hz(w) for w in self.band)

@@ -86,7 +86,7 @@ class FlangeMachine(Machine):
                 remark = flange.coarse(omega[(omega >= low) & (omega <= high)])
                 if remark is not None:
                     found.append(remark.of(", ".join(c.dof.upper() for c in flange.coordinates if not c.dof.is_slope)))
-        return (*found, *(() if self.axial is None else self.axial.remarks))
+        return (*found, *(() if self.axial is None else self.axial.remarks(self.band)))
 
     def _joint(self, group: tuple[Coordinate, ...]) -> LumpedJoint | None:
         if not isinstance(self.joint, Mapping):

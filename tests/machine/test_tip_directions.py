@@ -148,7 +148,7 @@ def tapped():
 def test_one_axial_tap_serves_all_tools(tapped, assembly):
     found = tapped.receptance(TAP).values[:, 0, 0]
     assert np.linalg.norm(found - axial_spindle(TAP)) < 0.01 * np.linalg.norm(found)
-    assert tapped.remarks == ()
+    assert tapped.remarks(tapped.band) == tapped.remarks(None) == ()
     machine = replace(machine_of(), axial=tapped)
     for rods, end in ((FACE, 1), ((*BALL, *HOLDER), 2)):
         tip = machine.tip(in_a_row("a tool", rods, end), TAP, directions=DIRECTIONS)
@@ -162,6 +162,19 @@ def test_one_axial_tap_serves_all_tools(tapped, assembly):
     # along the axis nothing of the bending is felt
     assert not np.any(tip.values[:, 2, :2])
     assert machine.tip(assembly, OMEGA).rows == TIP
+
+
+def test_a_tap_over_less_than_the_machines_band_is_told(tapped):
+    low, high = tapped.band
+    (told,) = tapped.remarks((low, 1.3 * high))
+    assert told.startswith(
+        f"along the axis it was tapped from {low / (2 * np.pi):.0f} to {high / (2 * np.pi):.0f} Hz, the machine is known from"
+    )
+    machine = machine_of()
+    shorter = replace(tapped, band=(machine.band[0], 0.5 * machine.band[1]))
+    assert any("along the axis it was tapped" in text for text in replace(machine, axial=shorter).remarks)
+    wider = replace(tapped, band=machine.band)
+    assert not any("it was tapped" in text for text in replace(machine, axial=wider).remarks)
 
 
 @cache
@@ -192,5 +205,5 @@ def test_limits_of_a_face_mill_take_the_slopes_of_the_chain():
 def test_a_tap_of_another_tooling_or_sign_is_named():
     wrong = axial_flange_from_tap(in_a_row("ball", (*BALL, *HOLDER), 2), TAP, axial_tip(FACE, TAP))
     turned = axial_flange_from_tap(in_a_row("face", FACE, 1), TAP, -axial_tip(FACE, TAP))
-    assert "would feed energy in" in turned.remarks[0]
+    assert "would feed energy in" in turned.remarks(None)[0]
     assert np.linalg.norm(wrong.receptance(TAP).values[:, 0, 0] - axial_spindle(TAP)) > 0.1 * np.linalg.norm(axial_spindle(TAP))
