@@ -62,10 +62,10 @@ def test_accelerometers_alone_say_how_far_they_can_be_trusted(folder, tmp_path):
     assert told["status"] == "suspect"
     assert "flange over tip force" not in (tmp_path / "R.html").read_text()
     assert "housing over tip force" in (tmp_path / "R.html").read_text()
-    # of Y a side minimum is found, which happens to one axis in five, whatever the seed; it is told: an axis without a deviation of its own
-    # was within 1.1 % for each of five seeds, one with it up to 44 % wrong
-    assert [a for a in "XY" if any(re.match(rf"{a}: .* deviation of [\d.]+ %", r) for r in told["reasons"])] == ["Y"]
-    assert within(tmp_path / "R.json", (0.02, np.inf))
+    # two toolings leave side minima, which one axis in five ends in; it is told: of five seeds axes without a deviation of their own were
+    # within 1.1 %, those with one up to 44 % wrong
+    doubted = {a for a in "XY" if any(re.match(rf"{a}: .* deviation of [\d.]+ %", r) for r in told["reasons"])}
+    assert within(tmp_path / "R.json", tuple(np.inf if a in doubted else 0.02 for a in "XY"))
 
 
 def test_check_says_what_such_a_cut_tells(folder):
