@@ -112,9 +112,9 @@ class PosedRobot(Machine):
         poles = self.flange.pole_residue().pole
         modes = poles[(np.abs(poles) < self.highest) & (poles.imag > 0.0)]
         around = to_hz(modes.imag[:, None] - modes.real[:, None] * _HALF_WIDTHS * np.linspace(-1.0, 1.0, _PER_MODE)).ravel()
-        every = np.concatenate([rising, np.arange(100.0, high + 0.5), around[(around > low) & (around < high)]])
+        every = np.sort(np.concatenate([rising, np.arange(100.0, high + 0.5), around]))
+        every = every[(every >= low) & (every <= high)]
         # lines that coincide tell nothing
-        every = np.sort(every)
         return from_hz(every[np.concatenate([[True], np.diff(every) > 1e-6 * every[1:]])])
 
     def coupled(self, tooling: Tooling | ToolAssembly, omega: FloatArray, axes: Sequence[Dof] | None = None) -> UncertainReceptance:

@@ -145,6 +145,8 @@ def test_lines_are_close_around_the_arms_modes(machine):
         assert omega[near] - omega[near - 1] < 0.25 * -pole.real
     assert to_hz(omega[0]) == pytest.approx(1.0)
     assert to_hz(omega[-1]) == pytest.approx(4500.0)
+    slow = replace(machine, highest=2.0 * np.pi * 50.0).lines()
+    assert 45.0 < to_hz(slow[-1]) <= 50.0
 
 
 def test_directions_and_remarks(machine):
