@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.errors import InputError
 from rcsa_ident.machine.robot.inertia import gravity_torques
 from rcsa_ident.machine.robot.kinematics import posed
 from rcsa_ident.machine.robot.model import RobotModel
@@ -35,6 +36,22 @@ def sag(robot: RobotModel, angles: FloatArray, tilts: bool = True, payload: bool
     bent = -gravity_torques(robot, _all(robot, angles, tilts), tilts, payload) / chain.chain.stiffness
     bent[chain.chain.driven[[j.gravity_compensated for j in robot.joints]]] = 0.0
     return chain.jacobian(chain.flange.point(robot.tool_point.offset)) @ bent
+
+
+def twist_per_payload(robot: RobotModel, angles: FloatArray) -> FloatArray:
+    """Return how far each drive's spring gives way for every kilogram that the payload weighs more, shape (j,) [rad/kg].
+
+    At the payload's centre, J^T g / k, in the sense of `sag`: how well a posture tells the payload's mass from the joints' encoders.
+
+    Raises
+    ------
+    InputError
+        If the robot carries none.
+    """
+    if robot.payload is None:
+        raise InputError("payload", "none", "a robot that carries one")
+    chain = posed(robot, angles)
+    return (robot.gravity @ chain.jacobian(chain.flange.point(robot.payload.centre))[:3]) / chain.chain.stiffness
 
 
 def spring_torques(robot: RobotModel, twist: FloatArray, rate: FloatArray, tilts: bool = True) -> FloatArray:
