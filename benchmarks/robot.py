@@ -30,7 +30,8 @@ frames, mass_of, torque_of, solve = kernels.frames, kernels.mass_matrix, kernels
 
 
 @numba.njit
-def _loop(turn, offset, axis, mass, centre, inertia, angles, rate, gravity, what):  # type: ignore[no-untyped-def]
+def _loop(*given: Any) -> float:
+    turn, offset, axis, mass, centre, inertia, angles, rate, gravity, what = given
     n = angles.shape[1]
     rotation, origin, direction = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 3))
     matrix, torque, still, total = np.empty((n, n)), np.empty(n), np.zeros(n), 0.0

@@ -220,7 +220,7 @@ def identify(
         found = fit_joints(arm, motions)
     changed = [replace(each, stiffness=float(found.stiffness[i])) if found.told[i] else each for i, each in enumerate(arm.joints)]
     names = ", ".join(path.name for path in records)
-    write_text(out, toml_of(robot_keys(arm.changed(joints=tuple(changed))), [f"joints from {names}"], digits=6))
+    write_text(out, toml_of(robot_keys(replace(arm, joints=tuple(changed))), [f"joints from {names}"], digits=6))
     explained = {each.name: found.explained(each) for each in [*motions, *others]}
     why = {True: "its motor turns other joints, too", False: "the records do not tell it from a rigid one"}
     warnings = [

@@ -188,13 +188,13 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
 def projection_basis(
     structure: Structure, rigid: FloatArray, moments: Sequence[FloatArray], max_omega: float, snapshots: int = 6, tolerance: float = 3e-7
 ) -> FloatArray:
-    """Return a basis as `poles` projects on, for equations that moments across the velocity join; shape (d, k).
+    """Return the undamped modes within what `poles` projects on, for equations that moments across the velocity join; shape (d, k).
 
     Parameters
     ----------
     structure : Structure
     rigid : array, shape (d, r)
-        Its rigid-body motions, mass-orthonormal; the basis is orthogonal to them.
+        Its rigid-body motions, mass-orthonormal, as the basis is; both are orthogonal to each other.
     moments : sequence of arrays, shape (d, d)
         Symmetric, within the bands of the mass. The dynamic stiffness loses omega times one of them; the basis is good for each of
         them and what lies between.
@@ -208,7 +208,10 @@ def projection_basis(
         damping = bands.damping.copy()
         damping[bands.half + rows - cols, cols] += 1j * moment[rows, cols]
         changed.append(replace(bands, damping=damping))
-    return _elastic_basis(_snapshots(structure, changed, max_omega, snapshots), bands, rigid, tolerance)
+    elastic = _elastic_basis(_snapshots(structure, changed, max_omega, snapshots), bands, rigid, tolerance)
+    _, shapes = scipy.linalg.eigh(elastic.T @ structure.stiffness @ elastic, elastic.T @ structure.mass @ elastic)
+    modes: FloatArray = elastic @ shapes
+    return modes
 
 
 def _snapshots(structure: Structure, equations: Sequence[_Bands], max_omega: float, count: int) -> FloatArray:

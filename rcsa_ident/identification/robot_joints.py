@@ -205,7 +205,8 @@ def _two_stages(motions: Sequence[_Motion], asked: Sequence[FloatArray], i: int)
     projected = left @ (left.T @ columns)
     scale = np.sqrt(np.mean(projected**2, axis=0))
     normal = (projected / scale).T @ (projected / scale)
-    # the encoder's error is small: as much as is believed of it at most
+    # the encoder's error is shrunk as if every sample erred by what the whole twist varies, and the covariance holds what is believed of
+    # it: weighed by the rest alone it takes up what the friction model lacks, and bands came out several times too narrow on virtual arms
     believed = np.zeros(6)
     believed[4:] = 1.0
     spread = np.std(twist) ** 2 / (_ECCENTRIC * scale) ** 2

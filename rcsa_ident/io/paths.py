@@ -10,7 +10,6 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_speed_csv
 from rcsa_ident.io.text_columns import read_table
-from rcsa_ident.io.validated_table import listed
 from rcsa_ident.units import to_hz, to_rpm
 
 PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("i", "j", "k")
@@ -30,10 +29,7 @@ def read_path(path: str | Path) -> tuple[FloatArray, FloatArray]:
     """
     table = read_table(path, "path")
     axis = AXIS if any(name in table.header for name in AXIS) else ()
-    for name in (*PLACE, *axis):
-        if table.header.count(name) != 1:
-            found = f"only {listed(table.header)}" if name not in table.header else "two columns of that name"
-            raise InputError(f"column {name}", found, f"columns {', '.join(PLACE)}, and {', '.join(AXIS)} of the tool's axis", table.where)
+    table.check_header((*PLACE, *axis), f"columns {', '.join(PLACE)}, and {', '.join(AXIS)} of the tool's axis")
     if not table.lines:
         raise InputError("path", "no row", "one or more places", table.where)
     columns = dict(zip((*PLACE, *axis), table.columns((*PLACE, *axis)), strict=True))

@@ -16,7 +16,6 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.robot_joints import JointRecord
 from rcsa_ident.io.matlab import tables_of
 from rcsa_ident.io.text_columns import read_table
-from rcsa_ident.io.validated_table import listed
 
 _MOTOR, _JOINT, _TORQUE = "rec.act_pos_mot_deg", "rec.act_pos_se_deg", "rec.act_torque_abs_nm"
 _TIME, _RATIO, _INERTIA = "rec.time_cont", "para.u", "para.J_mr"
@@ -53,11 +52,8 @@ def _from_text(path: Path) -> JointRecord:
     table = read_table(path, "robot record")
     count = sum(name.startswith("motor_") for name in table.header)
     names = [f"{what}_{k}_{unit}" for what, unit in (("motor", "deg"), ("joint", "deg"), ("torque", "nm")) for k in range(1, count + 1)]
-    for name in ("time_s", *names):
-        if table.header.count(name) != 1 or not count:
-            raise InputError(
-                f"column {name}", f"only {listed(table.header)}", "time_s, and motor_1_deg, joint_1_deg, torque_1_nm, ...", str(path)
-            )
+    # without a joint the first one's columns are asked for
+    table.check_header(("time_s", *names) if count else ("time_s", "motor_1_deg"), "time_s, and motor_1_deg, joint_1_deg, torque_1_nm, ...")
     time, *rows = table.columns(("time_s", *names))
     values = np.array(rows).reshape(3, count, -1)
     if not np.all(np.isfinite(values)):

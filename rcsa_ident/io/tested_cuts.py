@@ -10,7 +10,6 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
-from rcsa_ident.io.validated_table import listed
 from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.units import from_hz, from_rpm, to_rpm
 
@@ -44,10 +43,7 @@ def tested_cuts_of(text: str, where: str) -> TestedCuts:
 
 def _conditions(table: TextTable, wanted: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
     """Speeds [rev/min] and depths [mm] of a table that has all the columns that are wanted."""
-    for name in wanted:
-        if table.header.count(name) != 1:
-            found = f"only {listed(table.header)}" if name not in table.header else "two columns of that name"
-            raise InputError(f"column {name}", found, f"columns {', '.join(wanted)}", table.where)
+    table.check_header(wanted, f"columns {', '.join(wanted)}")
     speed, depth = table.columns(COLUMNS[:2])
     for name, values, unit in zip(COLUMNS, (speed, depth), ("rev/min", "mm"), strict=False):
         wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))

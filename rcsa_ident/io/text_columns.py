@@ -48,6 +48,13 @@ class TextTable:
         """Return file and line of a row."""
         return f"{self.where} line {self.numbers[row]}"
 
+    def check_header(self, names: Sequence[str], allowed: str) -> None:
+        """Refuse a table in which one of the columns is missing or stands twice; `allowed` says in words which there should be."""
+        for name in names:
+            if self.header.count(name) != 1:
+                found = f"only {listed(self.header)}" if name not in self.header else "two columns of that name"
+                raise InputError(f"column {name}", found, allowed, self.where)
+
     def columns(self, names: Sequence[str]) -> list[FloatArray]:
         """Return the named columns, shape (n,) each; an empty cell is NaN.
 

@@ -278,7 +278,7 @@ class Machine(TipSource, Drawn):
         if len(sides) == 1:
             highest = float(tip.omega[-1])
             tip = replace(tip, poles=partial(poles_of, drawing.assembly, sides[0].part.believed, highest, turning, slopes))
-        if set(directions) > set(TIP) or (set(directions) == set(TIP) < set(tip.rows)):
+        if set(directions) > set(TIP) or not set(tip.rows) <= set(directions):
             tip = tip.among(directions)
         return tip if spread else replace(tip, variation=None)
 

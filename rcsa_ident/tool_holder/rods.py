@@ -11,7 +11,6 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
@@ -112,9 +111,7 @@ def reduced_rod(assembly: ToolAssembly, highest: float, twisting: bool = False) 
     """Return the free assembly as a rod in few coordinates, its own exact solutions at a few frequencies; see `rod_poles`."""
     structure = rod_structure(assembly, twisting)
     rigid = np.ones((structure.mass.shape[0], 1)) / np.sqrt(np.sum(structure.mass))
-    elastic = projection_basis(structure, rigid, [np.zeros_like(structure.mass)], highest)
-    _, shapes = scipy.linalg.eigh(elastic.T @ structure.stiffness @ elastic, elastic.T @ structure.mass @ elastic)
-    basis = np.hstack([rigid, elastic @ shapes])
+    basis = np.hstack([rigid, projection_basis(structure, rigid, [np.zeros_like(structure.mass)], highest)])
     stiffness = basis.T @ (structure.stiffness + 1j * structure.structural_damping) @ basis
     damping = basis.T @ structure.damping @ basis
     # nothing holds a free rod

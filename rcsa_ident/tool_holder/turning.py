@@ -17,7 +17,6 @@ from functools import lru_cache
 from typing import Self
 
 import numpy as np
-import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
@@ -90,8 +89,6 @@ class TurningToolHolder:
         rigid = np.stack([translation, rotation / np.sqrt(rotation @ structure.mass @ rotation)], axis=1)
         moments = [sense * 2.0 * fastest * rotary for sense in (1.0, -1.0)]
         elastic = projection_basis(structure, rigid, moments, highest)
-        _, shapes = scipy.linalg.eigh(elastic.T @ structure.stiffness @ elastic, elastic.T @ structure.mass @ elastic)
-        elastic = elastic @ shapes
         m = 2 + elastic.shape[1]
         stiffness, damping = np.zeros((m, m), dtype=complex), np.zeros((m, m))
         stiffness[2:, 2:] = elastic.T @ (structure.stiffness + 1j * structure.structural_damping) @ elastic

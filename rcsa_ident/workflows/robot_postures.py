@@ -99,7 +99,7 @@ def following(robot: RobotModel, start: FloatArray, tips: FloatArray, axes: Floa
         x = x / np.linalg.norm(x)
         turn = np.stack([x, np.cross(-axis, x), -axis], axis=1)
         flange = Frame(turn, tip + length * axis).then(robot.tool_point.inverse)
-        ways = postures_of(robot, flange)
+        ways = postures_of(robot, flange, near=here)
         if not len(ways):
             told = ", ".join(f"{1e3 * v:.0f}" for v in tip)
             raise InputError(f"place {number} of the path", f"{told} mm", "one that the robot reaches within its limits")

@@ -20,7 +20,7 @@ def believed():
     """The arm as its file has it: stiffnesses up to a factor of two off."""
     arm = moving_arm.arm()
     off = (2.0, 0.5, 1.6, 0.6, 2.0, 0.5)
-    return arm.changed(joints=tuple(replace(j, stiffness=f * j.stiffness) for j, f in zip(arm.joints, off, strict=True)))
+    return replace(arm, joints=tuple(replace(j, stiffness=f * j.stiffness) for j, f in zip(arm.joints, off, strict=True)))
 
 
 def plain(record, i):
@@ -64,7 +64,7 @@ def test_without_a_delay_none_is_found(believed):
 
 def test_lengths_count_and_masses_do_not(records, believed):
     """Whatever the links weigh: the file's masses are not asked."""
-    light = believed.changed(joints=tuple(replace(j, body=replace(j.body, mass=0.1 * j.body.mass)) for j in believed.joints))
+    light = replace(believed, joints=tuple(replace(j, body=replace(j.body, mass=0.1 * j.body.mass)) for j in believed.joints))
     one, other = (fit_joints(arm, records[:1]) for arm in (believed, light))
     np.testing.assert_array_equal(one.stiffness, other.stiffness)
 

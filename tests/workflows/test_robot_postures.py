@@ -1,5 +1,7 @@
 """Postures along a path: the tool's tip is where it should be, its axis as told, and joints do not jump."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,6 @@ def test_a_place_out_of_reach_is_named(tooling):
 
 def test_an_arm_of_another_kind_has_the_posture_that_was_asked_for():
     arm = robot("tx200")
-    five = arm.changed(joints=arm.joints[:5])
+    five = replace(arm, joints=arm.joints[:5])
     found = at_posture(FlexibleRobot(five), np.full(5, 0.3))
     np.testing.assert_array_equal(found.postures, [np.full(5, 0.3)])

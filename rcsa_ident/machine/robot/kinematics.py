@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -36,13 +35,8 @@ class PosedChain:
     direction: FloatArray
     flange: Frame
 
-    @cached_property
-    def flange_jacobian(self) -> FloatArray:
-        """Motion of the flange with each angle, translations [m/rad] before rotations, shape (6, n)."""
-        return self.jacobian(self.flange.offset)
-
     def jacobian(self, point: FloatArray) -> FloatArray:
-        """Return the motion of a point of the last link with each angle, shape (6, n).
+        """Return the motion of a point of the last link with each angle, translations [m/rad] before rotations, shape (6, n).
 
         Parameters
         ----------
@@ -85,7 +79,7 @@ def tool_point_at(robot: RobotModel, angles: FloatArray) -> Frame:
     return flange_at(robot, angles).then(robot.tool_point)
 
 
-def postures_of(robot: RobotModel, flange: Frame, within_limits: bool = True) -> FloatArray:
+def postures_of(robot: RobotModel, flange: Frame, within_limits: bool = True, near: FloatArray | None = None) -> FloatArray:
     """Return all postures that bring the flange to a place, shape (s, 6) [rad], s = 0 where it is out of reach.
 
     For arms of six joints whose last three axes cross in one point and whose second and third axis are parallel, as nearly all are. The
@@ -99,6 +93,8 @@ def postures_of(robot: RobotModel, flange: Frame, within_limits: bool = True) ->
         As seen from the base.
     within_limits : bool
         Only postures that the joints' limits allow; else angles within half a turn.
+    near : array, shape (6,) [rad], default zero
+        Of the whole turns that limits leave to an angle, those nearest to this posture.
 
     Raises
     ------
@@ -115,7 +111,8 @@ def postures_of(robot: RobotModel, flange: Frame, within_limits: bool = True) ->
         for last in arm.wrists((_turn(arm.axes[0], one) @ _turn(arm.axes[1], two) @ _turn(arm.axes[2], three)).T @ rotation)
     ]
     limits = [j.limits if within_limits else (-np.pi, np.pi) for j in robot.joints]
-    kept = np.array([[turned_within(a, limit) for a, limit in zip(each, limits, strict=True)] for each in found]).reshape(-1, 6)
+    middle = np.zeros(6) if near is None else near
+    kept = np.array([[turned_within(*own) for own in zip(each, limits, middle, strict=True)] for each in found]).reshape(-1, 6)
     kept = kept[np.all(np.isfinite(kept), axis=1)]
     # where the wrist is stretched, both of its solutions are one
     alike = np.array([[np.max(np.abs(a - b), initial=0.0) < _CROSSING for b in kept] for a in kept]).reshape(len(kept), len(kept))

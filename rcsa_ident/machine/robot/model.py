@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import degrees
 from typing import NamedTuple
@@ -341,17 +341,13 @@ class RobotModel(Shown):
         said = [text for j in self.joints for text in j.body.warnings(f"link behind {j.name}")]
         return tuple(said if self.payload is None else [*said, *self.payload.warnings("payload")])
 
-    def changed(self, **fields: object) -> RobotModel:
-        """Return the robot with other fields."""
-        return replace(self, **fields)  # type: ignore[arg-type]
 
-
-def turned_within(angle: float, limits: tuple[float, float]) -> float:
-    """Return an angle with as many whole turns as bring it within limits, the nearest to zero; NaN where none does."""
+def turned_within(angle: float, limits: tuple[float, float], near: float = 0.0) -> float:
+    """Return an angle with as many whole turns as bring it within limits, the nearest to another one; NaN where none does."""
     low, high = limits
-    turns = np.arange(-2, 3) * 2.0 * np.pi + np.arctan2(np.sin(angle), np.cos(angle))
+    turns = np.arange(-3, 4) * 2.0 * np.pi + np.arctan2(np.sin(angle), np.cos(angle))
     within = turns[(turns >= low) & (turns <= high)]
-    return float(within[np.argmin(np.abs(within))]) if within.size else np.nan
+    return float(within[np.argmin(np.abs(within - near))]) if within.size else np.nan
 
 
 def _unit(name: str, axis: FloatArray) -> FloatArray:

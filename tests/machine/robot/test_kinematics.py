@@ -89,6 +89,16 @@ def test_eight_postures_of_the_printed_pose():
     assert said == "J3 stands at -212.14°, its limits are -140° and 145°"
 
 
+def test_whole_turns_that_limits_leave_are_those_nearest_to_a_posture():
+    """The fourth joint may turn by 270°: on a path through 200° it does not jump to -160°."""
+    arm = robot("tx200")
+    angles = np.radians([10.0, 20.0, 100.0, 200.0, 60.0, -230.0])
+    flange = flange_at(arm, angles)
+    assert min(np.abs(each - angles).max() for each in postures_of(arm, flange, near=angles)) < 1e-9
+    folded = np.radians([10.0, 20.0, 100.0, -160.0, 60.0, 130.0])
+    assert min(np.abs(each - folded).max() for each in postures_of(arm, flange)) < 1e-9
+
+
 def test_a_place_out_of_reach_has_no_posture():
     assert postures_of(robot("tx200"), Frame(offset=np.array([3.0, 0.0, 0.0]))).shape == (0, 6)
 
@@ -96,14 +106,15 @@ def test_a_place_out_of_reach_has_no_posture():
 def test_an_arm_of_another_kind_is_refused():
     arm = robot("tx200")
     bent = replace(arm.joints[4], frame=Frame(offset=np.array([0.05, 0.0, 0.6])))
-    other = arm.changed(joints=(*arm.joints[:4], bent, arm.joints[5]))
+    other = replace(arm, joints=(*arm.joints[:4], bent, arm.joints[5]))
     with pytest.raises(InputError, match="last three axes cross"):
         postures_of(other, Frame())
     with pytest.raises(InputError, match="found 5 joints"):
-        postures_of(arm.changed(joints=arm.joints[:5]), Frame())
+        postures_of(replace(arm, joints=arm.joints[:5]), Frame())
 
 
 def test_whole_turns_bring_an_angle_within_limits():
     assert turned_within(np.radians(200.0), (-np.pi, np.pi)) == pytest.approx(np.radians(-160.0))
     assert turned_within(np.radians(200.0), (0.0, 2.0 * np.pi)) == pytest.approx(np.radians(200.0))
     assert np.isnan(turned_within(np.radians(170.0), (-1.0, 1.0)))
+    assert turned_within(np.radians(-160.0), np.radians((-270.0, 270.0)), np.radians(190.0)) == pytest.approx(np.radians(200.0))

@@ -106,7 +106,7 @@ def test_where_nothing_moves_the_tip_gives_way_as_springs_do(arm, machine, tooli
     tip = machine.tip(tooling, np.array([2.0 * np.pi * 0.05]), directions=DIRECTIONS[:3]).values[0].real
     model = arm.model
     length = tooling.assembly.stickout + sum(each.length for each in tooling.assembly.holder)
-    longer = model.changed(tool_point=replace(model.tool_point, offset=model.tool_point.offset + length * model.tool_point.turn[:, 2]))
+    longer = replace(model, tool_point=replace(model.tool_point, offset=model.tool_point.offset + length * model.tool_point.turn[:, 2]))
     axes = tool_point_at(model, TABLE_7).turn @ np.diag([1.0, -1.0, -1.0])
     base = axes.T @ static_compliance(longer, TABLE_7)[:3, :3] @ axes
     across, along = 1.0 / JOINT.translational_stiffness + length**2 / JOINT.rotational_stiffness, 1.0 / JOINT.translational_stiffness
@@ -182,7 +182,7 @@ def test_limits_of_the_tx200(tilts, material, times, feed):
     stiffer = tuple(
         replace(j, damping=times * j.damping, tilts=tuple(replace(t, damping=times * t.damping) for t in j.tilts)) for j in arm.joints
     )
-    posed = PosedRobot(FlexibleRobot(arm.changed(joints=stiffer), tilts), TABLE_7, np.radians(FEEDS[feed]))
+    posed = PosedRobot(FlexibleRobot(replace(arm, joints=stiffer), tilts), TABLE_7, np.radians(FEEDS[feed]))
     poles = posed.flange.pole_residue()
     tip = TipModes(poles.pole, poles.outputs[[0, 2]], poles.inputs[:, [0, 2]], np.zeros((2, 2)))
     coefficients, speed = MATERIALS[material]
