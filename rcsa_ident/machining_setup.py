@@ -242,6 +242,8 @@ class Cut(Shown):
     last_speed : float or None [rad/s]
         At which a pass ends whose speed changes evenly in time from that of `conditions`; None where the speed is kept. The feed per
         tooth is kept in either case.
+    posture : tuple of float [rad]
+        Of a robot's joints; empty on any other machine.
     """
 
     id: str
@@ -250,6 +252,7 @@ class Cut(Shown):
     recording: Path
     air: Path | None = None
     last_speed: float | None = None
+    posture: tuple[float, ...] = ()
 
     @property
     def speeds(self) -> tuple[float, float]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ CUT_KEYS = (
     "feed_direction",
     "cut",
     "air",
+    "posture_deg",
 )
 
 
@@ -66,7 +68,8 @@ def cut_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Tabl
         check_cut(cutter, conditions.engagement, conditions.axial_depth, conditions.feed_per_tooth)
     name = table.text("id")
     air = locate(table, "air") if "air" in table else None
-    return Cut(name, tooling, conditions, locate(table, "cut"), air, _last_speed(table, conditions.spindle_speed))
+    posture = tuple(radians(each) for each in table.numbers("posture_deg", None, "deg")) if "posture_deg" in table else ()
+    return Cut(name, tooling, conditions, locate(table, "cut"), air, _last_speed(table, conditions.spindle_speed), posture)
 
 
 def engagement_of(table: Table, cutter: Cutter, locate: Callable[[Table, str], Path]) -> AnyEngagement:
@@ -178,7 +181,9 @@ def feed_direction_of(angle: float) -> str | float:
     return next((axis for axis, known in FEED_DIRECTIONS.items() if abs(angle - known) < 1e-12), float(np.degrees(angle)))
 
 
-def cut_keys(name: str, tooling: str, conditions: CuttingConditions, last_speed: float | None = None) -> dict[str, Any]:
+def cut_keys(
+    name: str, tooling: str, conditions: CuttingConditions, last_speed: float | None = None, posture: Sequence[float] = ()
+) -> dict[str, Any]:
     """Return an entry of ``[[cuts]]``; its recordings are named after it.
 
     Parameters
@@ -187,6 +192,8 @@ def cut_keys(name: str, tooling: str, conditions: CuttingConditions, last_speed:
     conditions : CuttingConditions
     last_speed : float or None [rad/s]
         Of a pass whose speed changes.
+    posture : sequence of float [rad]
+        Of a robot's joints, if it is one.
     """
     return {
         "id": name,
@@ -199,6 +206,7 @@ def cut_keys(name: str, tooling: str, conditions: CuttingConditions, last_speed:
         "feed_direction": feed_direction_of(conditions.feed_angle),
         "cut": f"recordings/{name}_cut.h5",
         "air": f"recordings/{name}_air.h5",
+        **({"posture_deg": [degrees(each) for each in posture]} if len(posture) else {}),
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.units import from_hz, to_rpm
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
+from rcsa_ident.virtual.machine import CutPlan
+from rcsa_ident.virtual.robot import RobotSetup, robot_cut_id
 from rcsa_ident.virtual.sensors import accelerometer_places
 
 Progress = Callable[[int, int], None]
@@ -79,18 +81,15 @@ def write_simulation(
             raise InputError("out", str(folder), "a folder that does not exist or is empty")
     total = len(toolings) * len(setup.plan.cuts)
     with filling(out, "out") as runs, filling(truth, "out") as known:
-        for folder in (runs / "recordings", runs / "toolings", known / "tip", known / "cross", known / "forces"):
-            folder.mkdir()
-        for path, tooling in zip(setup.toolings, toolings, strict=True):
-            # where the schema for editors lies is another way from there
-            text = path.read_text("utf-8-sig")
-            write_text(runs / "toolings" / f"{tooling.name}.toml", re.sub(r"\A#:schema .*\n", "", text))
+        for folder in ("tip", "cross", "forces"):
+            (known / folder).mkdir()
+        _write_head(runs, dict(zip(setup.toolings, toolings, strict=True)))
         write_text(runs / "campaign.toml", campaign_text(setup, toolings))
         rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
         for done, cut in enumerate(cuts, start=1):
             _write_columns(known / "forces" / f"{cut.id}.csv", ("order",), np.arange(cut.force_lines.shape[0]), cut.force_lines)
+            _write_records(runs, cut, setup.sensors.rate)
             for kind, record in cut.records.items():
-                write_hdf5(runs / "recordings" / f"{cut.id}_{kind}.h5", setup.sensors.rate, record.channels)
                 rows.append(f"{cut.id}_{kind},{to_rpm(record.spindle_speed):.9g},{np.degrees(record.tooth_angle):.9g}")
             if progress is not None:
                 progress(done, total)
@@ -142,7 +141,86 @@ def _write_columns(path: Path, first: tuple[str], abscissa: FloatArray, values: 
 
 def campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
     """Return the campaign file, as a machinist would write it; recordings are ``recordings/<cut>_cut.h5`` and ``_air.h5``."""
-    suite, plan = setup.sensors, setup.plan
+    plan = setup.plan
+    cuts = [
+        cut_keys(f"{tooling.name}-{name}", tooling.name, _conditions(plan, speed), last)
+        for tooling in toolings
+        for name, speed, last, _ in plan.cuts
+    ]
+    return _campaign_text(setup.name, setup, toolings, cuts)
+
+
+def robot_campaign_text(name: str, setup: RobotSetup, toolings: Sequence[Tooling]) -> str:
+    """Return the same of a robot: each cut tells the posture that it was made at.
+
+    Parameters
+    ----------
+    name : str
+    setup : RobotSetup
+    toolings : sequence of Tooling
+    """
+    plan = setup.plan
+    cuts = [
+        cut_keys(robot_cut_id(tooling.name, number, name), tooling.name, _conditions(plan, speed), last, posture.tolist())
+        for tooling in toolings
+        for number, posture in enumerate(setup.postures)
+        for name, speed, last, _ in plan.cuts
+    ]
+    return _campaign_text(name, setup, toolings, cuts)
+
+
+def write_robot_campaign(
+    out: str | Path,
+    name: str,
+    setup: RobotSetup,
+    toolings: Mapping[Path, Tooling],
+    cuts: Iterable[SimulatedCut],
+    progress: Progress | None = None,
+) -> None:
+    """Write a robot's campaign into a folder; no truth beside it.
+
+    Parameters
+    ----------
+    out : path
+        A folder that does not exist yet, or an empty one.
+    name : str
+    setup : RobotSetup
+    toolings : mapping of Path to Tooling
+        Their files.
+    cuts : iterable of SimulatedCut
+    progress : callable of (done, total), optional
+    """
+    total = len(toolings) * len(setup.postures) * len(setup.plan.cuts)
+    with filling(out, "out") as runs:
+        _write_head(runs, toolings)
+        write_text(runs / "campaign.toml", robot_campaign_text(name, setup, list(toolings.values())))
+        for done, cut in enumerate(cuts, start=1):
+            _write_records(runs, cut, setup.sensors.rate)
+            if progress is not None:
+                progress(done, total)
+
+
+def _write_head(runs: Path, toolings: Mapping[Path, Tooling]) -> None:
+    """Folders, and the toolings' files."""
+    for folder in ("recordings", "toolings"):
+        (runs / folder).mkdir()
+    for path, tooling in toolings.items():
+        # where the schema for editors lies is another way from there
+        text = path.read_text("utf-8-sig")
+        write_text(runs / "toolings" / f"{tooling.name}.toml", re.sub(r"\A#:schema .*\n", "", text))
+
+
+def _write_records(runs: Path, cut: SimulatedCut, rate: float) -> None:
+    for kind, record in cut.records.items():
+        write_hdf5(runs / "recordings" / f"{cut.id}_{kind}.h5", rate, record.channels)
+
+
+def _conditions(plan: CutPlan, speed: float) -> CuttingConditions:
+    return CuttingConditions(speed, plan.axial_depth, plan.feed_per_tooth, plan.engagement, plan.feed_angle)
+
+
+def _campaign_text(name: str, setup: MachineFile | RobotSetup, toolings: Sequence[Tooling], cuts: list[dict[str, Any]]) -> str:
+    suite = setup.sensors
     gap = ("displacement", suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
     acceleration = ("acceleration", suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth)
     sensors = {f"flange_{axis.lower()}": _sensor(axis, *gap) for axis in "XY"}
@@ -155,17 +233,7 @@ def campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
     if suite.trigger:
         angle = float(f"{np.degrees(suite.tooth_angle):.9g}")
         sensors["trigger"] = {"quantity": "trigger", "pulses_per_revolution": 1, "tooth_angle_deg": angle}
-    cuts = [
-        cut_keys(
-            f"{tooling.name}-{name}",
-            tooling.name,
-            CuttingConditions(speed, plan.axial_depth, plan.feed_per_tooth, plan.engagement, plan.feed_angle),
-            last,
-        )
-        for tooling in toolings
-        for name, speed, last, _ in plan.cuts
-    ]
-    exact = {"campaign": {"name": setup.name, "sampling_rate_hz": suite.rate}, "sensors": sensors}
+    exact = {"campaign": {"name": name, "sampling_rate_hz": suite.rate}, "sensors": sensors}
     rest = {"workpiece": workpiece_keys(setup.workpiece), "toolings": {t.name: f"toolings/{t.name}.toml" for t in toolings}, "cuts": cuts}
     return toml_of(exact) + "\n" + toml_of(rest, digits=9)
 

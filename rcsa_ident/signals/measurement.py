@@ -397,7 +397,9 @@ def _chatter(
         return heard_in_a_cut(cut.motion, cut.recording.rate, cut.rotation, teeth)
     forced = np.abs(motion[harmonic]).max(axis=0)
     band = (0.5 * teeth * to_hz(cut.spindle_speed), max_frequency)
-    return chatter(cut.lines, list(range(len(cut.axes))), forced, band, None if air is None else air.lines)
+    # without accelerometers beside them, displacements are all that is known
+    absolute = cut.absolute if len(cut.channels.columns) > len(cut.axes) else None
+    return chatter(cut.lines, list(range(len(cut.axes))), forced, band, None if air is None else air.lines, absolute)
 
 
 def fits_by_chance(cuts: Sequence[tuple[str, bool | None]]) -> list[Remark | None]:

@@ -77,6 +77,11 @@ class SteadyRecord:
         """Variance of its real and of its imaginary part each, shape (orders, axes) [m^2]."""
         return self._summed(self.output_variance)
 
+    def absolute(self, omega: FloatArray) -> ComplexArray:
+        """Return the share of each channel in the absolute displacement of the flange, or of the housing, shape (n, channels, axes)."""
+        weights: ComplexArray = self._summed(self.channels.weights(omega))
+        return weights
+
     def _summed(self, outputs: NDArray[Any]) -> NDArray[Any]:
         return np.stack([np.sum(outputs[..., self.channels.searched(axis)], axis=-1) for axis in self.axes], axis=-1)
 

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.channel_scan import scan
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.units import from_hz, to_hz, to_rpm
 
 #: Least and largest swing, peak to peak, of what a milling spindle does and a sensor tells.
 PLAUSIBLE = {Quantity.DISPLACEMENT: (2e-9, 2e-3, "m"), Quantity.ACCELERATION: (1e-4, 1e5, "m/s^2")}
 #: A peak off the spindle's orders is chatter above this share of the largest tooth-passing line.
 CHATTER_SHARE = 0.3
+#: Distance, as a logarithm of frequency, within which a line's background lies.
+_BESIDE = 0.4
+#: Of frequencies [rad/s], what of each channel is in an absolute motion; see `chatter`.
+Absolute = Callable[[FloatArray], ComplexArray]
 #: Share of the programmed speed within which a wrong one is looked for.
 WIDE_SEARCH = 0.12
 #: Share of its power by which a tooth-passing line stands above what run-out does at other orders.
@@ -205,7 +210,12 @@ def silence(power: FloatArray, variance: FloatArray) -> Remark | None:
 
 
 def chatter(
-    lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float], air: LineSpectrum | None = None
+    lines: LineSpectrum,
+    channels: list[int],
+    forced: FloatArray,
+    band: tuple[float, float],
+    air: LineSpectrum | None = None,
+    absolute: Absolute | None = None,
 ) -> Remark | None:
     """Return a remark if a vibration off the spindle's orders stands out, else None.
 
@@ -220,9 +230,13 @@ def chatter(
         Frequencies between which chatter is looked for.
     air : LineSpectrum, optional
         Of the air cut: what is there, too, is no chatter.
+    absolute : callable, optional
+        Of frequencies [rad/s], what of each channel is in the absolute motion along each displacement, shape (n, channels, c): a spindle
+        that swings with its housing moves no displacement sensor that stands on it.
     """
     n, step = lines.rest.shape[0], to_hz(lines.spindle_speed)
-    amplitude = _spectrum(lines, channels)
+    amplitude = _spectrum(lines, channels, absolute)
+    forced = np.resize(forced, amplitude.shape[1])
     frequency = np.fft.rfftfreq(n, 1.0 / lines.rate)
     order = frequency / step
     # a Hann line reaches two bins to each side of the spindle's orders
@@ -230,11 +244,15 @@ def chatter(
     inside = clear & (frequency > band[0]) & (frequency < band[1])
     if not inside.any():
         return None
-    still = np.zeros_like(amplitude) if air is None else _near(air, channels, frequency)
+    still = np.zeros_like(amplitude) if air is None else _near(air, channels, frequency, absolute)
     for c in range(amplitude.shape[1]):
         candidates = np.where(inside & (amplitude[:, c] > 2.0 * still[:, c]), amplitude[:, c], 0.0)
         peak = int(np.argmax(candidates))
-        floor = float(np.median(amplitude[inside, c]))
+        if candidates[peak] == 0.0:
+            continue
+        # what was felt as an acceleration has a floor that falls with frequency
+        beside = inside & (np.abs(np.log(np.maximum(frequency, band[0]) / frequency[peak])) < _BESIDE)
+        floor = float(np.median(amplitude[inside if c < len(channels) else beside, c]))
         if candidates[peak] > CHATTER_SHARE * forced[c] and candidates[peak] > 10.0 * floor:
             words = (
                 f"chatter: {candidates[peak] * 1e6:.3g} µm at {frequency[peak]:.0f} Hz, which is not a multiple of the spindle frequency, "
@@ -244,15 +262,19 @@ def chatter(
     return None
 
 
-def _spectrum(lines: LineSpectrum, channels: list[int]) -> FloatArray:
-    """Amplitudes of what a record holds beside the orders, shape (bins, c)."""
+def _spectrum(lines: LineSpectrum, channels: list[int], absolute: Absolute | None) -> FloatArray:
+    """Amplitudes of what displacements hold beside the orders, and behind them those of the absolute motion, shape (bins, c or 2 c)."""
     window = hann(lines.rest.shape[0])
-    return 2.0 * np.abs(np.fft.rfft(lines.off_orders[:, channels] * window[:, None], axis=0)) / window.sum()
+    if absolute is None:
+        return 2.0 * np.abs(np.fft.rfft(lines.off_orders[:, channels] * window[:, None], axis=0)) / window.sum()
+    every = 2.0 * np.fft.rfft(lines.off_orders * window[:, None], axis=0) / window.sum()
+    weights = absolute(from_hz(np.fft.rfftfreq(window.size, 1.0 / lines.rate)))
+    return np.abs(np.concatenate([every[:, channels], np.einsum("nk,nkc->nc", every, weights)], axis=1))
 
 
-def _near(lines: LineSpectrum, channels: list[int], frequency: FloatArray) -> FloatArray:
+def _near(lines: LineSpectrum, channels: list[int], frequency: FloatArray, absolute: Absolute | None) -> FloatArray:
     """Largest amplitude that a record holds beside the orders near each frequency, shape (f, c)."""
-    amplitude = _spectrum(lines, channels)
+    amplitude = _spectrum(lines, channels, absolute)
     own = np.arange(amplitude.shape[0]) * lines.rate / lines.rest.shape[0]
     step = max(own[1], frequency[1])
     places = [frequency + shift * step for shift in range(-3, 4)]

@@ -91,11 +91,11 @@ def mill(decay, gain, shape, state, teeth, ahead, cut, turn, course, force):
     """March the spindle through a cut and return its outputs, shape (n, o).
 
     decay: e^{pole dt}, shape (p, m), in p equal parts of the cut one after the other; gain: of the old and the new force, shape
-    (p, 2, m, 2); shape: outputs of the poles, shape (p, o, m), the first two the tip's X and Y, doubled for the conjugate poles; state: of
-    the poles at the start, shape (m,);
+    (p, 2, m, 2), or (p, 2, m, 3) where the force along z counts, too; shape: outputs of the poles, shape (p, o, m), the first two
+    the tip's X and Y, doubled for the conjugate poles; state: of the poles at the start, shape (m,);
     teeth: angles and edges as in `cut_force`; ahead: angles as in `passed`; cut: as in `cut_force`; turn: feed axes in machine axes, shape
     (2, 2); course: angle of tooth 1, way of the feed and share of the width that is cut, shape (n, 3); force: shape (n, 3), is filled: in
-    machine axes, and along z, which moves nothing. The force between two instants is linear, so the march is exact in it.
+    machine axes, and along z. The force between two instants is linear, so the march is exact in it.
     """
     n = force.shape[0]
     tooth, edges = teeth
@@ -111,11 +111,13 @@ def mill(decay, gain, shape, state, teeth, ahead, cut, turn, course, force):
     now = cut.copy()
     local = np.zeros(3)
     position = np.zeros(2)
-    instant = np.zeros((parts, 2, 2))
+    inputs = gain.shape[3]
+    axial = inputs == 3
+    instant = np.zeros((parts, 2, inputs))
     for p in range(parts):
         for k in range(m):
             for a in range(2):
-                for b in range(2):
+                for b in range(inputs):
                     instant[p, a, b] += (shape[p, a, k] * gain[p, 1, k, b]).real
     free = np.zeros(2)
     for i in range(n):
@@ -124,14 +126,17 @@ def mill(decay, gain, shape, state, teeth, ahead, cut, turn, course, force):
             fx, fy = force[i - 1, 0], force[i - 1, 1]
             for k in range(m):
                 state[k] = decay[p, k] * state[k] + gain[p, 0, k, 0] * fx + gain[p, 0, k, 1] * fy
+            if axial:
+                for k in range(m):
+                    state[k] += gain[p, 0, k, 2] * force[i - 1, 2]
         free[0] = 0.0
         free[1] = 0.0
         for k in range(m):
             free[0] += shape[p, 0, k].real * state[k].real - shape[p, 0, k].imag * state[k].imag
             free[1] += shape[p, 1, k].real * state[k].real - shape[p, 1, k].imag * state[k].imag
-        gx, gy = 0.0, 0.0
+        gx, gy, gz = 0.0, 0.0, 0.0
         if i > 0:
-            gx, gy = force[i - 1, 0], force[i - 1, 1]
+            gx, gy, gz = force[i - 1, 0], force[i - 1, 1], force[i - 1, 2]
         now[0] = angle[i]
         if i > 0:
             passed(i, ahead, angle, places)
@@ -142,19 +147,26 @@ def mill(decay, gain, shape, state, teeth, ahead, cut, turn, course, force):
             if i > 0:
                 x += instant[p, 0, 0] * gx + instant[p, 0, 1] * gy
                 y += instant[p, 1, 0] * gx + instant[p, 1, 1] * gy
+                if axial:
+                    x += instant[p, 0, 2] * gz
+                    y += instant[p, 1, 2] * gz
             position[0] = turn[0, 0] * x + turn[1, 0] * y + course[i, 1]
             position[1] = turn[0, 1] * x + turn[1, 1] * y
             cut_force(position, tooth, edges, places, now, before, path, local)
             gx = course[i, 2] * (turn[0, 0] * local[0] + turn[0, 1] * local[1])
             gy = course[i, 2] * (turn[1, 0] * local[0] + turn[1, 1] * local[1])
+            gz = course[i, 2] * local[2]
         force[i, 0] = gx
         force[i, 1] = gy
-        force[i, 2] = course[i, 2] * local[2]
+        force[i, 2] = gz
         path[i, 0] = position[0]
         path[i, 1] = position[1]
         if i > 0:
             for k in range(m):
                 state[k] += gain[p, 1, k, 0] * gx + gain[p, 1, k, 1] * gy
+            if axial:
+                for k in range(m):
+                    state[k] += gain[p, 1, k, 2] * gz
         for a in range(outputs):
             value = 0.0
             for k in range(m):

@@ -57,7 +57,7 @@ class CutHistory:
     acceleration : array, shape (n, 2 + 2 h) [m/s^2]
         Acceleration of the fixture, then of each of h further points, of the housing and last of the workpiece, X and Y.
     axial : array, shape (n,) [N]
-        Force on the tool along z, from the tip to the spindle; the machine is rigid that way.
+        Force on the tool along z, from the tip to the spindle; a machine without that input is rigid that way.
     """
 
     step: float
@@ -94,8 +94,8 @@ def mill_cut(
     Parameters
     ----------
     dynamics : Poles, or a sequence of them
-        The machine with inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``, and ``housing1``, ``housing2``, ...
-        and ``workpiece`` where further accelerometers stand; of one that changes while it cuts, one
+        The machine with inputs ``tip.x``, ``tip.y``, a robot ``tip.z`` as well, and outputs at ``tip``, ``flange``, ``fixture``, and
+        ``housing1``, ``housing2``, ... and ``workpiece`` where further accelerometers stand; of one that changes while it cuts, one
         for each of equal parts of the cut, in the same order and scale (`reduction.alike`).
     cutter : Cutter
     conditions : CuttingConditions
@@ -120,9 +120,10 @@ def mill_cut(
     speed = conditions.spindle_speed
     parts = (dynamics,) if isinstance(dynamics, Poles) else tuple(dynamics)
     dynamics = parts[0]
-    if dynamics.inputs.shape[1] != 2:
-        raise InputError("inputs", dynamics.inputs.shape[1], "two: tip.x and tip.y")
-    lines = rigid_force_lines(cutter, conditions, coefficients, slices)[:, :2]
+    inputs = dynamics.inputs.shape[1]
+    if inputs not in (2, 3):
+        raise InputError("inputs", inputs, "two or three: tip.x, tip.y, and tip.z where the machine gives way along it")
+    lines = rigid_force_lines(cutter, conditions, coefficients, slices)[:, :inputs]
     order = np.arange(lines.shape[0])
     iw = 1j * speed * order
     course = _even(conditions, cutter.teeth, step, count, start_angle) if course is None else course
@@ -155,7 +156,7 @@ def mill_cut(
         tip=result[:, 0:2],
         flange=result[:, 2:4],
         fixture=result[:, 4:6],
-        acceleration=result[:, 6:] + force[:, :2] @ through.real.T,
+        acceleration=result[:, 6:] + force[:, :inputs] @ through.real.T,
     )
 
 

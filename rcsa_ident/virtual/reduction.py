@@ -42,7 +42,11 @@ class ReducedRotor:
 
 
 def reduced(
-    model: Rotor, max_frequency: float = 16e3, inputs: tuple[str, ...] = ("tip.x", "tip.y"), exact_at: tuple[float, ...] = EXACT_AT
+    model: Rotor,
+    max_frequency: float = 16e3,
+    inputs: tuple[str, ...] = ("tip.x", "tip.y"),
+    exact_at: tuple[float, ...] = EXACT_AT,
+    planes: int = 2,
 ) -> ReducedRotor:
     """Return the rotor on its undamped modes up to `max_frequency` [Hz] and its damped motion under forces at `inputs`.
 
@@ -55,21 +59,23 @@ def reduced(
     exact_at : tuple of float [Hz]
         Frequencies at which the full solutions, real and imaginary parts apart, join the basis: dampers that act in one
         place, as in the tool's clamping, excite shapes that no low undamped mode has.
+    planes : int
+        Equal parts of the freedoms between which there is no mass: X and Y; 1 of a rotor on a robot.
     """
     d = model.mass.shape[0]
-    half = d // 2
+    size = d // planes
     solutions = frequency_motion(model, 2.0 * np.pi * np.asarray(exact_at), inputs)
     motion = np.concatenate([solutions.real, solutions.imag]).transpose(1, 0, 2).reshape(d, -1)
     bases = []
-    for plane in (slice(0, half), slice(half, d)):
+    for plane in (slice(k * size, (k + 1) * size) for k in range(planes)):
         mass, stiffness = model.mass[plane, plane].toarray(), model.stiffness[plane, plane].toarray()
         limit = (2.0 * np.pi * max_frequency) ** 2
         _, shapes = scipy.linalg.eigh(stiffness, mass, subset_by_value=(-np.inf, limit))
         extra = motion[plane]
         for _ in range(2):
             extra = extra - shapes @ (shapes.T @ (mass @ extra))
-            size = np.sqrt(np.maximum(np.einsum("ij,ij->j", extra, mass @ extra), 0.0))
-            extra = extra[:, size > 1e-9 * size.max()] / size[size > 1e-9 * size.max()]
+            length = np.sqrt(np.maximum(np.einsum("ij,ij->j", extra, mass @ extra), 0.0))
+            extra = extra[:, length > 1e-9 * length.max()] / length[length > 1e-9 * length.max()]
         gram, turn = scipy.linalg.eigh(extra.T @ mass @ extra)
         kept = gram > 1e-7 * gram[-1]
         extra = extra @ (turn[:, kept] / np.sqrt(gram[kept]))

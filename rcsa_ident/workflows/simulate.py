@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.scaleout import Map
@@ -17,6 +17,7 @@ from rcsa_ident.virtual.disturbances import Disturbances, turning
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
 from rcsa_ident.virtual.milling import Course, CutHistory, mill_cut, synchronous_lines
 from rcsa_ident.virtual.reduction import Poles, ReducedRotor, alike, poles, reduced
+from rcsa_ident.virtual.robot import RobotSetup, VirtualRobot, robot_cut_id, robot_rotor
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.virtual.sensors import Clamping, SensorSuite, accelerometer_places, clamp, padding, record
 from rcsa_ident.virtual.workpiece_side import VirtualWorkpieceSide
@@ -25,6 +26,8 @@ from rcsa_ident.virtual.workpiece_side import VirtualWorkpieceSide
 OVERSAMPLING = 8
 #: Parts of a pass in each of which a machine that changes with the speed is taken for constant.
 PARTS = 24
+#: What pushes a tool on a robot.
+ALL_TIPS = ("tip.x", "tip.y", "tip.z")
 #: Frequencies of the true receptances [Hz]: first, last, step.
 TRUTH_FREQUENCIES = (5.0, 4500.0, 5.0)
 
@@ -78,6 +81,46 @@ def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: M
         Runs the cuts; they do not depend on each other's order.
     """
     yield from map(_Worker(setup), list(_jobs(setup, toolings, np.random.default_rng(seed))))
+
+
+def simulate_robot(setup: RobotSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
+    """Yield every tooling's cut at every posture and speed of the plan, in order.
+
+    Parameters
+    ----------
+    setup : RobotSetup
+    toolings : sequence of Tooling
+    seed : int
+        Same seed, same records.
+    map : callable
+    """
+    rng = np.random.default_rng(seed)
+    jobs = []
+    for tooling in toolings:
+        chance = rng.spawn(1)[0]
+        # one clamping for all postures
+        clamping = clamp(setup.sensors, tooling.cutter.tooth_angle, chance)
+        for number, posture in enumerate(setup.postures):
+            small = reduced(robot_rotor(setup.robot, posture, tooling.assembly), inputs=ALL_TIPS, planes=1)
+            for name, speed, last, duration in setup.plan.cuts:
+                id, conditions = robot_cut_id(tooling.name, number, name), setup.plan.conditions(speed)
+                jobs.append(_Job(id, tooling, poles(small, speed, ALL_TIPS), clamping, conditions, last, duration, chance.spawn(1)[0]))
+    yield from map(_Worker(setup), jobs)
+
+
+def true_robot_tip(robot: VirtualRobot, posture: FloatArray, tooling: Tooling, omega: FloatArray, speed: float = 0.0) -> ComplexArray:
+    """Return the tip's receptance over X, Y and Z of the spindle, from the full equations, shape (n, 3, 3) [m/N].
+
+    Parameters
+    ----------
+    robot : VirtualRobot
+    posture : array, shape (j,) [rad]
+    tooling : Tooling
+    omega : array, shape (n,) [rad/s]
+    speed : float [rad/s]
+        Of the spindle.
+    """
+    return frequency_response(robot_rotor(robot, posture, tooling.assembly), omega, speed, ALL_TIPS, ALL_TIPS)
 
 
 def true_receptances(setup: VirtualSetup, tooling: Tooling, speed: float | None = None) -> TrueReceptances:

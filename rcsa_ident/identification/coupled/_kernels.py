@@ -54,7 +54,7 @@ class LineArrays(NamedTuple):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _factorise(matrix):
+def factorise(matrix):
     """Replace a square complex matrix by its factors L U without pivoting; the pivots' inverses stand on the diagonal.
 
     Z / (i omega) has a positive semidefinite Hermitian part: such matrices need no pivoting.
@@ -71,7 +71,7 @@ def _factorise(matrix):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _solve(factors, right):
+def solve(factors, right):
     """Solve L U x = right in place, all columns."""
     m, columns = right.shape
     for i in range(m):
@@ -90,7 +90,7 @@ def _solve(factors, right):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _solve_transposed(factors, right):
+def solve_transposed(factors, right):
     """Solve (L U)^T x = right in place, all columns."""
     m, columns = right.shape
     for i in range(m):
@@ -153,11 +153,11 @@ def coupled_lines(machine, points, lines_x, lines_y):
                 dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * d_ij)
             for a in range(sides):
                 right[i, a] = psi[i, a]
-        _factorise(dynamic)
+        factorise(dynamic)
         if turns and linear:
             left[:] = right
-            _solve_transposed(dynamic, left)
-        _solve(dynamic, right)
+            solve_transposed(dynamic, left)
+        solve(dynamic, right)
         # without gyroscopic coupling Z is symmetric
         back = left if turns else right
         for a in range(sides):
@@ -171,11 +171,11 @@ def coupled_lines(machine, points, lines_x, lines_y):
             for c in range(4):
                 together[a, c] = points.flange[f, a, c] + block[a, c]
             together[a, a] += k_t if a % 2 == 0 else k_r
-        _factorise(together)
+        factorise(together)
         for a in range(4):
             for c in range(2):
                 carried[a, c] = points.tip[f, a, c]
-        _solve(together, carried)
+        solve(together, carried)
         for a in range(4):
             x[a] = carried[a, 0] * points.force[f, 0] + carried[a, 1] * points.force[f, 1]
         for i in range(m):
@@ -206,7 +206,7 @@ def coupled_lines(machine, points, lines_x, lines_y):
                 if gradient.shape[0] == 0:
                     continue
                 y[:] = b
-                _solve_transposed(together, column)
+                solve_transposed(together, column)
                 for c in range(4):
                     v[c] = -y[c]
                 v[2 * axis] += flange

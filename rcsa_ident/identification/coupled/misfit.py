@@ -83,7 +83,7 @@ class CoupledMisfit(Misfit):
             change = np.einsum("nos,nsc->noc", parts, data.slope[at][:, :, : min(named, layout.coefficients)])
             model = parts.sum(axis=2)
             extra = np.concatenate([change, model[:, :, None] * smooth[:, None, :]], axis=2)
-            answers.append(_CoupledAnswer(model, found.gradient, extra, _compliance(found, factor), machine, theta))
+            answers.append(_CoupledAnswer(model, found.gradient, extra, compliance_of(found.felt, found.moved, factor), machine, theta))
         return answers
 
 
@@ -98,10 +98,18 @@ def _lines(axis: WeightedLines, layout: CoupledLayout, normal: bool) -> LineArra
     return LineArrays(*(np.empty(shape, dtype=complex) for shape in shapes))
 
 
-def _compliance(lines: LineArrays, factor: ComplexArray) -> ComplexArray:
-    """The lines' change with the flange's symmetric receptance, its upper triangle by rows, shape (n, o, 10)."""
+def compliance_of(felt: ComplexArray, moved: ComplexArray, factor: ComplexArray) -> ComplexArray:
+    """Return the lines' change with the flange's symmetric receptance, its upper triangle by rows, shape (n, o, 10).
+
+    Parameters
+    ----------
+    felt, moved : complex arrays, shapes (n, o, 4), (n, 4)
+        v and x of a line's change v^T dB x.
+    factor : complex array, shape (n,) or longer
+        On each line.
+    """
     rows, cols = np.triu_indices(DIRECTIONS)
-    both = lines.felt[:, :, :, None] * lines.moved[:, None, None, :]
+    both = felt[:, :, :, None] * moved[:, None, None, :]
     found: ComplexArray = both[:, :, rows, cols] + np.where(rows != cols, both[:, :, cols, rows], 0.0)
     return found * factor[: found.shape[0], None, None]
 

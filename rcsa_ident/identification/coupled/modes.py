@@ -36,7 +36,7 @@ class CoupledSteps:
         order = np.argsort(machine.omega_n, kind="stable")
         for low, high in pairwise(order.tolist()):
             if machine.omega_n[high] < CLOSE * machine.omega_n[low]:
-                trials.append(_with(solution, selected(_merged(machine, low, high), everyone != high), discs[:, :, everyone != high]))
+                trials.append(_with(solution, selected(merged(machine, low, high), everyone != high), discs[:, :, everyone != high]))
         return trials
 
     def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
@@ -105,8 +105,8 @@ def _with(solution: Solution, machine: CoupledParameters, discs: FloatArray) -> 
     return np.concatenate([pack(machine, layout, discs), solution.theta[old.tail :]]), layout
 
 
-def _merged(machine: CoupledParameters, low: int, high: int) -> CoupledParameters:
-    """The machine whose mode `low` does, as well as one can, what `low` and `high` do."""
+def merged(machine: CoupledParameters, low: int, high: int) -> CoupledParameters:
+    """Return the machine whose mode `low` does, as well as one can, what `low` and `high` do."""
     both = machine.psi[[low, high]]
     psi, omega_n, fixture = machine.psi.copy(), machine.omega_n.copy(), machine.fixture.copy()
     psi[low] = rank_one((both.T @ both)[np.triu_indices(DIRECTIONS)])

@@ -1,0 +1,235 @@
+"""Lines of a robot at postures, with their gradient; arrays and scalars only.
+
+Scaled units as in `identification._kernels`: slopes are multiplied and moments divided by a lever, all receptances are in m/N.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from rcsa_ident.identification.coupled._kernels import factorise, solve, solve_transposed
+
+
+class ArmArrays(NamedTuple):
+    """An arm as the kernel reads it.
+
+    mass (c, n, n) at each posture; shapes (c, n, 6): what each freedom moves at the flange, t and r in X and in Y, along Z and about it;
+    stiffness, damping (n,).
+    """
+
+    mass: np.ndarray
+    shapes: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+
+
+class SpindleArrays(NamedTuple):
+    """The spindle's own modes beside the arm: omega_n (m,); psi (m, 6): flange t, r in X and in Y, fixture x, y; factor (m, m) lower
+    triangular; residual (4, 4) lower triangular factor; fixture_residual (2, 4); joint (4,): k_t, k_r, c_t, c_r.
+    """
+
+    omega_n: np.ndarray
+    psi: np.ndarray
+    factor: np.ndarray
+    residual: np.ndarray
+    fixture_residual: np.ndarray
+    joint: np.ndarray
+
+
+class PointArrays(NamedTuple):
+    """Points at which a cut's line is asked for: (p,) omega; (p,) posture; (p, 2) places of the line of X and of Y or -1; (p, 6, 6) A22
+    and (p, 6, 3) A21 of the cut's tooling; (p, 3) complex forces in X, Y and Z.
+    """
+
+    omega: np.ndarray
+    posture: np.ndarray
+    place: np.ndarray
+    flange: np.ndarray
+    tip: np.ndarray
+    force: np.ndarray
+
+
+class LineArrays(NamedTuple):
+    """What the kernel fills for one axis: (n, o, 3) displacement by the force in X, Y and Z [m]; (n, o, q) its gradient, or (0, o, q);
+    (n, o, 4) v and (n, 4) x, with which a change dB of the flange's receptance in both bending planes moves it by v^T dB x, or (0, o, 4)
+    and (0, 4).
+    """
+
+    parts: np.ndarray
+    gradient: np.ndarray
+    felt: np.ndarray
+    moved: np.ndarray
+
+
+@numba.njit(cache=True, error_model="numpy")
+def posed_lines(arm, spindle, points, lines_x, lines_y):
+    """Fill the lines of both axes: displacement of flange, or of gap and fixture, by each force, and its gradient.
+
+    B = S^T Za^-1 S + Psi^T Z^-1 Psi + R R^T over six directions, of which the spindle's modes move four; Za = K - w^2 M(q) + i w C is the
+    arm, Z as in `coupled_lines`, E = A22 + K_joint^-1 + B. The fixture moves with the arm as the flange does. With x, y, v, p and q as
+    there, and likewise pa and qa of the arm: d line = v^T dB x + p^T (dPsi x - dZ q) - pa^T dZa qa - y^T dK_joint^-1 x.
+
+    The gradient's columns: stiffness (n), damping (n), log omega_n (m), psi's first four columns by rows (4 m), factor's lower triangle by
+    rows, residual's lower triangle by rows (10), with two outputs psi's last two columns by rows (2 m) and the fixture's residual (8),
+    joint (4).
+    """
+    omega_n, psi, factor, residual, fixture_residual, joint = spindle
+    n, m = arm.stiffness.size, omega_n.size
+    linear = lines_x.gradient.shape[0] > 0 or lines_y.gradient.shape[0] > 0
+    sides = 6 if lines_x.parts.shape[1] == 2 else 4
+    damping = factor @ factor.T
+    static = residual @ residual.T
+    dynamic = np.empty((m, m), dtype=np.complex128)
+    moving = np.empty((n, n), dtype=np.complex128)
+    right = np.empty((m, sides), dtype=np.complex128)
+    swung = np.empty((n, 6), dtype=np.complex128)
+    # rows: the flange's six directions, then the fixture's two
+    block = np.zeros((8, 6), dtype=np.complex128)
+    together = np.empty((6, 6), dtype=np.complex128)
+    carried = np.empty((6, 3), dtype=np.complex128)
+    x, v, b = np.empty((3, 6), dtype=np.complex128)
+    rx, rv = np.empty((2, 4), dtype=np.complex128)
+    column = np.empty((6, 1), dtype=np.complex128)
+    y = column[:, 0]
+    p, q, lp, lq = np.empty((4, m), dtype=np.complex128)
+    qa = np.empty(n, dtype=np.complex128)
+    for f in range(points.omega.size):
+        w, c = points.omega[f], points.posture[f]
+        for i in range(n):
+            for j in range(n):
+                moving[i, j] = complex(-w * w * arm.mass[c, i, j], 0.0)
+            moving[i, i] += complex(arm.stiffness[i], w * arm.damping[i])
+            for a in range(6):
+                swung[i, a] = arm.shapes[c, i, a]
+        factorise(moving)
+        solve(moving, swung)
+        for i in range(m):
+            for j in range(m):
+                dynamic[i, j] = complex(omega_n[i] ** 2 - w * w if i == j else 0.0, w * damping[i, j])
+            for a in range(sides):
+                right[i, a] = psi[i, a]
+        factorise(dynamic)
+        solve(dynamic, right)
+        for a in range(6):
+            for d in range(6):
+                total = complex(0.0, 0.0)
+                for i in range(n):
+                    total += arm.shapes[c, i, a] * swung[i, d]
+                block[a, d] = total
+        for k in range(2):
+            block[6 + k] = block[2 * k]
+        for a in range(sides):
+            row = a if a < 4 else a + 2
+            for d in range(4):
+                total = complex(static[a, d] if a < 4 else fixture_residual[a - 4, d], 0.0)
+                for i in range(m):
+                    total += psi[i, a] * right[i, d]
+                block[row, d] += total
+        k_t, k_r = 1.0 / complex(joint[0], w * joint[2]), 1.0 / complex(joint[1], w * joint[3])
+        for a in range(6):
+            for d in range(6):
+                together[a, d] = points.flange[f, a, d] + block[a, d]
+            together[a, a] += k_t if a % 2 == 0 else k_r
+            for d in range(3):
+                carried[a, d] = points.tip[f, a, d]
+        factorise(together)
+        solve(together, carried)
+        for a in range(6):
+            x[a] = carried[a, 0] * points.force[f, 0] + carried[a, 1] * points.force[f, 1] + carried[a, 2] * points.force[f, 2]
+        for i in range(m):
+            total = complex(0.0, 0.0)
+            for d in range(4):
+                total += right[i, d] * x[d]
+            q[i] = total
+        for i in range(n):
+            total = complex(0.0, 0.0)
+            for d in range(6):
+                total += swung[i, d] * x[d]
+            qa[i] = total
+        for axis in range(2):
+            place = points.place[f, axis]
+            if place < 0:
+                continue
+            parts = lines_x.parts if axis == 0 else lines_y.parts
+            gradient = lines_x.gradient if axis == 0 else lines_y.gradient
+            felt = lines_x.felt if axis == 0 else lines_y.felt
+            moved = lines_x.moved if axis == 0 else lines_y.moved
+            outputs = parts.shape[1]
+            for o in range(outputs):
+                # share of flange and fixture in the output
+                flange = 1.0 if o == 0 else 0.0
+                fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
+                for d in range(6):
+                    b[d] = flange * block[2 * axis, d] + fixture * block[6 + axis, d]
+                for side in range(3):
+                    total = complex(0.0, 0.0)
+                    for d in range(6):
+                        total += b[d] * carried[d, side]
+                    parts[place, o, side] = total * points.force[f, side]
+                if not linear:
+                    continue
+                y[:] = b
+                solve_transposed(together, column)
+                v[:] = -y
+                v[2 * axis] += flange
+                for d in range(4):
+                    felt[place, o, d] = v[d]
+                    moved[place, d] = x[d]
+                row = gradient[place, o]
+                for i in range(n):
+                    total = fixture * swung[i, 2 * axis]
+                    for d in range(6):
+                        total += swung[i, d] * v[d]
+                    row[i] = -total * qa[i]
+                    row[n + i] = complex(0.0, w) * row[i]
+                for i in range(m):
+                    total = complex(0.0, 0.0)
+                    for d in range(4):
+                        total += right[i, d] * v[d]
+                    if outputs == 2:
+                        total += fixture * right[i, 4 + axis]
+                    p[i] = total
+                for j in range(m):
+                    sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
+                    for i in range(j, m):
+                        sum_p += factor[i, j] * p[i]
+                        sum_q += factor[i, j] * q[i]
+                    lp[j], lq[j] = sum_p, sum_q
+                for j in range(4):
+                    sum_x, sum_v = complex(0.0, 0.0), complex(0.0, 0.0)
+                    for i in range(j, 4):
+                        sum_x += residual[i, j] * x[i]
+                        sum_v += residual[i, j] * v[i]
+                    rx[j], rv[j] = sum_x, sum_v
+                first = 2 * n
+                k = first + m
+                for i in range(m):
+                    row[first + i] = -2.0 * omega_n[i] ** 2 * p[i] * q[i]
+                    for d in range(4):
+                        row[k] = v[d] * q[i] + p[i] * x[d]
+                        k += 1
+                turn = complex(0.0, -w)
+                for i in range(m):
+                    for j in range(i + 1):
+                        row[k] = turn * (p[i] * lq[j] + lp[j] * q[i])
+                        k += 1
+                for i in range(4):
+                    for j in range(i + 1):
+                        row[k] = v[i] * rx[j] + rv[j] * x[i]
+                        k += 1
+                if outputs == 2:
+                    for i in range(m):
+                        row[k + axis] = fixture * q[i]
+                        row[k + 1 - axis] = 0.0
+                        k += 2
+                    for d in range(4):
+                        row[k + 4 * axis + d] = fixture * x[d]
+                        row[k + 4 * (1 - axis) + d] = 0.0
+                    k += 8
+                row[k] = (y[0] * x[0] + y[2] * x[2] + y[4] * x[4]) * k_t * k_t
+                row[k + 1] = (y[1] * x[1] + y[3] * x[3] + y[5] * x[5]) * k_r * k_r
+                row[k + 2] = complex(0.0, w) * row[k]
+                row[k + 3] = complex(0.0, w) * row[k + 1]
