@@ -259,6 +259,34 @@ def force_and_slope(
     return total, np.divide(change, total[..., None], out=np.zeros_like(change), where=total[..., None] != 0.0)
 
 
+def axial_and_slope(
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
+) -> tuple[ComplexArray, dict[ForceTerm, ComplexArray]]:
+    """Return the lines of the force along z, from the tip to the spindle, and how their logarithms change; without run-out.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
+    orders : array of int, shape (m,)
+        Multiples of the spindle frequency.
+
+    Returns
+    -------
+    complex array, shape (m,) [N], and one of the same shape for each term but the run-out; 0 where there is no force
+    """
+    parts = unit_lines(cutter, conditions, orders, axial=True)[:, 2] * _values(coefficients)
+    total = parts.sum(axis=1)
+    change = {
+        ForceTerm.TANGENTIAL: parts[:, 0] + parts[:, 1] + parts[:, 4],
+        ForceTerm.RATIO: parts[:, 1],
+        ForceTerm.TANGENTIAL_EDGE: parts[:, 2],
+        ForceTerm.RADIAL_EDGE: parts[:, 3],
+    }
+    return total, {term: np.divide(each, total, out=np.zeros_like(each), where=total != 0.0) for term, each in change.items()}
+
+
 def force_history(
     cutter: Cutter,
     conditions: CuttingConditions,

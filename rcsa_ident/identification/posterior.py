@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,7 +13,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, flange_modes, joint_of, unpack
-from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, OpenQuestion, Perturbation
 from rcsa_ident.machine.spindle import Spindle
 
 #: Longest step along a direction of the covariance from which a change is told: logarithms, or of order one.
@@ -154,41 +152,6 @@ def steps_along(theta: FloatArray, covariance: FloatArray, candidate: Callable[[
             ahead, behind = (candidate(theta + sign * step * direction) for sign in (1.0, -1.0))
             steps.append(Perturbation(ahead, behind, size / (2.0 * step)))
     return tuple(steps)
-
-
-class Doubtful(Protocol):
-    """Whoever can tell what is not known of a machine."""
-
-    def doubt(self, *question: Any) -> Doubt:
-        """Return it for a bending plane, a spindle speed, or both."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class OpenQuestion:
-    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself.
-
-    Parameters
-    ----------
-    posterior : Doubtful
-    question : tuple
-        What its `doubt` is asked.
-    """
-
-    posterior: Doubtful
-    question: tuple[Any, ...]
-
-    @cached_property
-    def answer(self) -> Doubt:
-        """The answer, kept."""
-        return self.posterior.doubt(*self.question)
-
-    def __call__(self) -> Doubt:
-        """Return the answer."""
-        return self.answer
-
-    def __reduce__(self) -> tuple[type[OpenQuestion], tuple[Doubtful, tuple[Any, ...]]]:
-        return type(self), (self.posterior, self.question)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -78,6 +80,41 @@ class Doubt:
     rivals: Sequence[JointedFlange] = ()
     shifts: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     left: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+class Doubtful(Protocol):
+    """Whoever can tell what is not known of a machine."""
+
+    def doubt(self, *question: Any) -> Doubt:
+        """Return it for a bending plane, a spindle speed, or both."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class OpenQuestion:
+    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself.
+
+    Parameters
+    ----------
+    posterior : Doubtful
+    question : tuple
+        What its `doubt` is asked.
+    """
+
+    posterior: Doubtful
+    question: tuple[Any, ...]
+
+    @cached_property
+    def answer(self) -> Doubt:
+        """The answer, kept."""
+        return self.posterior.doubt(*self.question)
+
+    def __call__(self) -> Doubt:
+        """Return the answer."""
+        return self.answer
+
+    def __reduce__(self) -> tuple[type[OpenQuestion], tuple[Doubtful, tuple[Any, ...]]]:
+        return type(self), (self.posterior, self.question)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,8 +15,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, lower_factor, pack, simple_axis
-from rcsa_ident.identification.posterior import OpenQuestion, PlaneUnknowns, steps_along
-from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
+from rcsa_ident.identification.posterior import PlaneUnknowns, steps_along
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, OpenQuestion
 
 #: Directions of the flange in the order of the unknowns.
 FLANGE: tuple[Coordinate, ...] = (*plane("flange", Dof.X), *plane("flange", Dof.Y))

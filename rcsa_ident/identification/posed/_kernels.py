@@ -27,15 +27,16 @@ class ArmArrays(NamedTuple):
 
 
 class SpindleArrays(NamedTuple):
-    """The spindle's own modes beside the arm: omega_n (m,); psi (m, 6): flange t, r in X and in Y, fixture x, y; factor (m, m) lower
-    triangular; residual (4, 4) lower triangular factor; fixture_residual (2, 4); joint (4,): k_t, k_r, c_t, c_r.
+    """The spindle on a clamped housing: omega_n (m,); psi (m, 4): flange t, r in X and in Y, against the housing; pull (m, 4): what the
+    same motion of the housing pulls a mode with; factor (m, m) lower triangular; residual (4, 4) lower triangular factor; joint (4,): k_t,
+    k_r, c_t, c_r.
     """
 
     omega_n: np.ndarray
     psi: np.ndarray
+    pull: np.ndarray
     factor: np.ndarray
     residual: np.ndarray
-    fixture_residual: np.ndarray
     joint: np.ndarray
 
 
@@ -68,66 +69,62 @@ class LineArrays(NamedTuple):
 def posed_lines(arm, spindle, points, lines_x, lines_y):
     """Fill the lines of both axes: displacement of flange, or of gap and fixture, by each force, and its gradient.
 
-    B = S^T Za^-1 S + Psi^T Z^-1 Psi + R R^T over six directions, of which the spindle's modes move four; Za = K - w^2 M(q) + i w C is the
-    arm, Z as in `coupled_lines`, E = A22 + K_joint^-1 + B. The fixture moves with the arm as the flange does. With x, y, v, p and q as
-    there, and likewise pa and qa of the arm: d line = v^T dB x + p^T (dPsi x - dZ q) - pa^T dZa qa - y^T dK_joint^-1 x.
+    Arm and spindle are one system of n + m freedoms, Z = K - w^2 M + i w C with M = [[M(q), S P^T], [P S^T, 1]], C = [[C, 0], [0, L L^T]].
+    The housing moves as S^T q, the flange as T^T = [S; Psi]^T of all of them, and gives way by R R^T more. With B = T^T Z^-1 T + R R^T and
+    E = A22 + K_joint^-1 + B over six directions, an output of row b answers b x with x = E^-1 A21 F. With y = E^-T b^T, v = the row's share
+    of the flange - y, p = Z^-1 (T v + the row's share of the housing), q = Z^-1 T x:
+    d line = v^T dB x + p^T (dT x - dZ q) + v^T dT^T q - y^T dK_joint^-1 x.
 
-    The gradient's columns: stiffness (n), damping (n), log omega_n (m), psi's first four columns by rows (4 m), factor's lower triangle by
-    rows, residual's lower triangle by rows (10), with two outputs psi's last two columns by rows (2 m) and the fixture's residual (8),
-    joint (4).
+    The gradient's columns: stiffness (n), damping (n), log omega_n (m), psi by rows (4 m), pull by rows (4 m), factor's lower triangle by
+    rows, residual's lower triangle by rows (10), joint (4).
     """
-    omega_n, psi, factor, residual, fixture_residual, joint = spindle
+    omega_n, psi, pull, factor, residual, joint = spindle
     n, m = arm.stiffness.size, omega_n.size
     linear = lines_x.gradient.shape[0] > 0 or lines_y.gradient.shape[0] > 0
-    sides = 6 if lines_x.parts.shape[1] == 2 else 4
+    outputs = lines_x.parts.shape[1]
     damping = factor @ factor.T
     static = residual @ residual.T
-    dynamic = np.empty((m, m), dtype=np.complex128)
-    moving = np.empty((n, n), dtype=np.complex128)
-    right = np.empty((m, sides), dtype=np.complex128)
-    swung = np.empty((n, 6), dtype=np.complex128)
-    # rows: the flange's six directions, then the fixture's two
-    block = np.zeros((8, 6), dtype=np.complex128)
+    dynamic = np.empty((n + m, n + m), dtype=np.complex128)
+    # what moves the flange's six directions, and behind them the housing along X and Y
+    seen = np.zeros((n + m, 8))
+    right = np.empty((n + m, 8), dtype=np.complex128)
+    block = np.empty((8, 6), dtype=np.complex128)
     together = np.empty((6, 6), dtype=np.complex128)
     carried = np.empty((6, 3), dtype=np.complex128)
     x, v, b = np.empty((3, 6), dtype=np.complex128)
-    rx, rv = np.empty((2, 4), dtype=np.complex128)
+    rx, rv, hp, hq = np.empty((4, 4), dtype=np.complex128)
     column = np.empty((6, 1), dtype=np.complex128)
     y = column[:, 0]
-    p, q, lp, lq = np.empty((4, m), dtype=np.complex128)
-    qa = np.empty(n, dtype=np.complex128)
+    p, q = np.empty((2, n + m), dtype=np.complex128)
+    lp, lq = np.empty((2, m), dtype=np.complex128)
+    seen[n:, :4] = psi
     for f in range(points.omega.size):
         w, c = points.omega[f], points.posture[f]
+        shapes = arm.shapes[c]
         for i in range(n):
             for j in range(n):
-                moving[i, j] = complex(-w * w * arm.mass[c, i, j], 0.0)
-            moving[i, i] += complex(arm.stiffness[i], w * arm.damping[i])
+                dynamic[i, j] = complex(-w * w * arm.mass[c, i, j], 0.0)
+            dynamic[i, i] += complex(arm.stiffness[i], w * arm.damping[i])
             for a in range(6):
-                swung[i, a] = arm.shapes[c, i, a]
-        factorise(moving)
-        solve(moving, swung)
+                seen[i, a] = shapes[i, a]
+            seen[i, 6], seen[i, 7] = shapes[i, 0], shapes[i, 2]
+            for j in range(m):
+                total = 0.0
+                for d in range(4):
+                    total += shapes[i, d] * pull[j, d]
+                dynamic[i, n + j] = dynamic[n + j, i] = complex(-w * w * total, 0.0)
         for i in range(m):
             for j in range(m):
-                dynamic[i, j] = complex(omega_n[i] ** 2 - w * w if i == j else 0.0, w * damping[i, j])
-            for a in range(sides):
-                right[i, a] = psi[i, a]
+                dynamic[n + i, n + j] = complex(omega_n[i] ** 2 - w * w if i == j else 0.0, w * damping[i, j])
+        right[:] = seen
         factorise(dynamic)
         solve(dynamic, right)
-        for a in range(6):
+        for a in range(8):
             for d in range(6):
-                total = complex(0.0, 0.0)
-                for i in range(n):
-                    total += arm.shapes[c, i, a] * swung[i, d]
+                total = complex(static[a, d] if a < 4 and d < 4 else 0.0, 0.0)
+                for i in range(n + m if a < 6 else n):
+                    total += seen[i, a] * right[i, d]
                 block[a, d] = total
-        for k in range(2):
-            block[6 + k] = block[2 * k]
-        for a in range(sides):
-            row = a if a < 4 else a + 2
-            for d in range(4):
-                total = complex(static[a, d] if a < 4 else fixture_residual[a - 4, d], 0.0)
-                for i in range(m):
-                    total += psi[i, a] * right[i, d]
-                block[row, d] += total
         k_t, k_r = 1.0 / complex(joint[0], w * joint[2]), 1.0 / complex(joint[1], w * joint[3])
         for a in range(6):
             for d in range(6):
@@ -139,16 +136,11 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
         solve(together, carried)
         for a in range(6):
             x[a] = carried[a, 0] * points.force[f, 0] + carried[a, 1] * points.force[f, 1] + carried[a, 2] * points.force[f, 2]
-        for i in range(m):
-            total = complex(0.0, 0.0)
-            for d in range(4):
-                total += right[i, d] * x[d]
-            q[i] = total
-        for i in range(n):
+        for i in range(n + m):
             total = complex(0.0, 0.0)
             for d in range(6):
-                total += swung[i, d] * x[d]
-            qa[i] = total
+                total += right[i, d] * x[d]
+            q[i] = total
         for axis in range(2):
             place = points.place[f, axis]
             if place < 0:
@@ -157,7 +149,6 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
             gradient = lines_x.gradient if axis == 0 else lines_y.gradient
             felt = lines_x.felt if axis == 0 else lines_y.felt
             moved = lines_x.moved if axis == 0 else lines_y.moved
-            outputs = parts.shape[1]
             for o in range(outputs):
                 # share of flange and fixture in the output
                 flange = 1.0 if o == 0 else 0.0
@@ -178,25 +169,26 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
                 for d in range(4):
                     felt[place, o, d] = v[d]
                     moved[place, d] = x[d]
+                for i in range(n + m):
+                    total = fixture * right[i, 6 + axis]
+                    for d in range(6):
+                        total += right[i, d] * v[d]
+                    p[i] = total
                 row = gradient[place, o]
                 for i in range(n):
-                    total = fixture * swung[i, 2 * axis]
-                    for d in range(6):
-                        total += swung[i, d] * v[d]
-                    row[i] = -total * qa[i]
+                    row[i] = -p[i] * q[i]
                     row[n + i] = complex(0.0, w) * row[i]
-                for i in range(m):
-                    total = complex(0.0, 0.0)
-                    for d in range(4):
-                        total += right[i, d] * v[d]
-                    if outputs == 2:
-                        total += fixture * right[i, 4 + axis]
-                    p[i] = total
+                for d in range(4):
+                    sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
+                    for i in range(n):
+                        sum_p += shapes[i, d] * p[i]
+                        sum_q += shapes[i, d] * q[i]
+                    hp[d], hq[d] = w * w * sum_p, w * w * sum_q
                 for j in range(m):
                     sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
                     for i in range(j, m):
-                        sum_p += factor[i, j] * p[i]
-                        sum_q += factor[i, j] * q[i]
+                        sum_p += factor[i, j] * p[n + i]
+                        sum_q += factor[i, j] * q[n + i]
                     lp[j], lq[j] = sum_p, sum_q
                 for j in range(4):
                     sum_x, sum_v = complex(0.0, 0.0), complex(0.0, 0.0)
@@ -204,31 +196,25 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
                         sum_x += residual[i, j] * x[i]
                         sum_v += residual[i, j] * v[i]
                     rx[j], rv[j] = sum_x, sum_v
-                first = 2 * n
-                k = first + m
+                k = 2 * n
                 for i in range(m):
-                    row[first + i] = -2.0 * omega_n[i] ** 2 * p[i] * q[i]
+                    row[k] = -2.0 * omega_n[i] ** 2 * p[n + i] * q[n + i]
+                    k += 1
+                for i in range(m):
                     for d in range(4):
-                        row[k] = v[d] * q[i] + p[i] * x[d]
+                        row[k] = v[d] * q[n + i] + p[n + i] * x[d]
+                        row[k + 4 * m] = hp[d] * q[n + i] + p[n + i] * hq[d]
                         k += 1
+                k += 4 * m
                 turn = complex(0.0, -w)
                 for i in range(m):
                     for j in range(i + 1):
-                        row[k] = turn * (p[i] * lq[j] + lp[j] * q[i])
+                        row[k] = turn * (p[n + i] * lq[j] + lp[j] * q[n + i])
                         k += 1
                 for i in range(4):
                     for j in range(i + 1):
                         row[k] = v[i] * rx[j] + rv[j] * x[i]
                         k += 1
-                if outputs == 2:
-                    for i in range(m):
-                        row[k + axis] = fixture * q[i]
-                        row[k + 1 - axis] = 0.0
-                        k += 2
-                    for d in range(4):
-                        row[k + 4 * axis + d] = fixture * x[d]
-                        row[k + 4 * (1 - axis) + d] = 0.0
-                    k += 8
                 row[k] = (y[0] * x[0] + y[2] * x[2] + y[4] * x[4]) * k_t * k_t
                 row[k + 1] = (y[1] * x[1] + y[3] * x[3] + y[5] * x[5]) * k_r * k_r
                 row[k + 2] = complex(0.0, w) * row[k]

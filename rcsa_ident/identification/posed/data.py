@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,8 @@ class PosedData:
     Parameters
     ----------
     base : IdentificationData
+    teeth : array of int, shape (t,)
+        Of each tooling's cutter.
     mass : array, shape (c, n, n) [kg m^2]
         Of all freedoms at each posture.
     shapes : array, shape (c, n, 6)
@@ -47,6 +49,7 @@ class PosedData:
     """
 
     base: IdentificationData
+    teeth: np.ndarray
     mass: FloatArray
     shapes: FloatArray
     posture: np.ndarray
@@ -62,13 +65,41 @@ class PosedData:
         """Of the arm."""
         return self.mass.shape[1]
 
+    def below(self, omega: float) -> PosedData:
+        """Return the points below a frequency [rad/s]."""
+        return self._kept(self.omega < omega, [axis.omega < omega for axis in self.base.axes])
+
+    def up_to_harmonic(self, highest: int) -> PosedData:
+        """Return the points up to a multiple of the tooth-passing frequency."""
+        most = highest * self.teeth[self.base.cut_tooling]
+        orders = np.zeros(self.omega.size)
+        for i, axis in enumerate(self.base.axes):
+            own = self.place[:, i] >= 0
+            orders[own] = (axis.order <= most[axis.cut])[self.place[own, i]]
+        return self._kept(orders > 0.0, [axis.order <= most[axis.cut] for axis in self.base.axes])
+
+    def _kept(self, points: np.ndarray, lines: list[np.ndarray]) -> PosedData:
+        place = np.array(self.place[points])
+        for i, kept in enumerate(lines):
+            there = place[:, i] >= 0
+            place[there, i] = (np.cumsum(kept) - 1)[place[there, i]]
+        axes = tuple(axis.of(kept) for axis, kept in zip(self.base.axes, lines, strict=True))
+        own = {name: getattr(self, name)[points] for name in ("posture", "omega", "force", "slope", "flange", "tip")}
+        return replace(self, base=replace(self.base, axes=axes), place=place, **own)
+
     def summed(self) -> PosedData:
         """Return the same with the flange's motion as the only output, and without the triggers of unknown tooth angle."""
         return replace(self, base=self.base.summed())
 
 
 def posed_data(
-    data: IdentificationData, robot: FlexibleRobot, postures: FloatArray, of_cut: np.ndarray, rods: Rods, axial: Axial
+    data: IdentificationData,
+    robot: FlexibleRobot,
+    postures: FloatArray,
+    of_cut: np.ndarray,
+    teeth: Mapping[str, int],
+    rods: Rods,
+    axial: Axial,
 ) -> PosedData:
     """Return a campaign's points on a robot.
 
@@ -80,6 +111,8 @@ def posed_data(
     postures : array, shape (c, j) [rad]
     of_cut : array of int, shape (k,)
         Posture of each cut.
+    teeth : mapping of str to int
+        Of the toolings.
     rods, axial : callables
 
     Raises
@@ -87,6 +120,8 @@ def posed_data(
     InputError
         If the cuts do not tell the flange's motion along both axes.
     """
+    if data.sweeps:
+        raise InputError("cuts", "passes whose speed changes", "cuts at one speed each, on a robot")
     if not couplable(data):
         allowed = "displacement sensors at the flange along X and Y and an accelerometer for each, in all cuts"
         raise InputError("sensors", "cuts that do not tell the flange's own motion along both axes", allowed)
@@ -105,6 +140,7 @@ def posed_data(
         force[own, 2], slope[own, 2] = axial(int(k), order[own])
     return PosedData(
         plain.base,
+        frozen([teeth[name] for name in data.toolings], np.intp),
         frozen([s.mass for s in structures]),
         frozen([s.ports * SCALE for s in structures]),
         frozen(of_cut[cut], np.intp),

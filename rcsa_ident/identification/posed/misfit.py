@@ -10,12 +10,11 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import whiten
 from rcsa_ident.identification.coupled.misfit import compliance_of
-from rcsa_ident.identification.coupled.parameters import DIRECTIONS, chain
 from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines
 from rcsa_ident.identification.parameters import JOINT, Unknowns, scaled_joint
 from rcsa_ident.identification.posed._kernels import ArmArrays, LineArrays, PointArrays, SpindleArrays, posed_lines
 from rcsa_ident.identification.posed.data import PosedData
-from rcsa_ident.identification.posed.parameters import PosedLayout, unpack_robot
+from rcsa_ident.identification.posed.parameters import DIRECTIONS, PosedLayout, chain, unpack
 from rcsa_ident.identification.posed.priors import ArmPriors, posed_prior_rows
 from rcsa_ident.identification.priors import PriorRows
 
@@ -51,25 +50,18 @@ class PosedMisfit(Misfit):
 
     def _answered(self, theta: FloatArray, layout: Unknowns, normal: bool) -> Sequence[Answer]:
         assert isinstance(layout, PosedLayout)
-        data, robot, own = self.posed, unpack_robot(theta, layout), layout.spindle
+        data, robot = self.posed, unpack(theta, layout)
         named = min(len(self.data.coefficients), layout.coefficients)
         force = data.force * np.exp(data.slope[:, :, :named] @ theta[layout.force][:named])
         lines = [_lines(axis, layout, normal) for axis in self._axes]
-        spindle = robot.spindle
+        spindle, joint = robot.spindle, scaled_joint(theta[layout.joint])
         posed_lines(
             ArmArrays(data.mass, data.shapes, robot.stiffness, robot.damping),
-            SpindleArrays(
-                spindle.omega_n,
-                np.hstack([spindle.psi, spindle.fixture]),
-                spindle.factor,
-                spindle.residual,
-                spindle.fixture_residual,
-                scaled_joint(theta[layout.joint]),
-            ),
+            SpindleArrays(spindle.omega_n, spindle.psi, spindle.pull, spindle.factor, spindle.residual, joint),
             PointArrays(data.omega, data.posture, data.place, data.flange, data.tip, force),
             *lines,
         )
-        answers = []
+        scale, answers = np.concatenate([chain(robot), joint]), []
         for i, (axis, found) in enumerate(zip(self.data.axes, lines, strict=True)):
             seen = np.flatnonzero(data.place[:, i] >= 0)
             at = np.empty(seen.size, dtype=np.intp)
@@ -79,7 +71,6 @@ class PosedMisfit(Misfit):
             if normal:
                 found.gradient[:] *= factor[:, None, None]
             change = np.einsum("nos,nsc->noc", parts, data.slope[at][:, :, :named])
-            scale = np.concatenate([robot.stiffness, robot.damping, chain(spindle, own), scaled_joint(theta[layout.joint])])
             answers.append(_PosedAnswer(parts.sum(axis=2), found.gradient, change, compliance_of(found.felt, found.moved, factor), scale))
         return answers
 

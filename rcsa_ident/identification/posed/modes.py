@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcsa_ident.identification.coupled.modes import PROMISING, merged, selected, with_mode
-from rcsa_ident.identification.coupled.parameters import CoupledParameters
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.model_order import CLOSE, Trial, new_modes
+from rcsa_ident.identification.model_order import Trial, new_modes
 from rcsa_ident.identification.parameters import Unknowns
-from rcsa_ident.identification.posed.parameters import PosedLayout, pack_robot, unpack_robot
+from rcsa_ident.identification.posed.parameters import PosedLayout, SpindleParameters, pack, unpack
+
+#: New modes that are tried at a time.
+PROMISING = 4
 
 
 class PosedSteps:
@@ -24,24 +25,17 @@ class PosedSteps:
         return 1
 
     def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
-        """Return the robots whose spindle has one mode less, or two close ones made one."""
+        """Return the robots whose spindle has one mode less."""
         spindle = _spindle(solution)
-        if spindle.order <= smallest:
-            return []
         everyone = np.arange(spindle.order)
-        trials = [_with(solution, selected(spindle, everyone != k)) for k in everyone]
-        order = np.argsort(spindle.omega_n, kind="stable").tolist()
-        for low, high in zip(order, order[1:], strict=False):
-            if spindle.omega_n[high] < CLOSE * spindle.omega_n[low]:
-                trials.append(_with(solution, selected(merged(spindle, low, high), everyone != high)))
-        return trials
+        return [_with(solution, spindle.of(everyone != k)) for k in everyone] if spindle.order > smallest else []
 
     def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
         """Return the robots whose spindle has one mode more in front, at the frequencies and along the shapes that promise most."""
         del i
         spindle = _spindle(solution)
         modes = new_modes(solution, misfit, (0, 1), band_hz, PROMISING)
-        return [_with(solution, with_mode(spindle, omega_n, shape, zeta)) for omega_n, zeta, shape in modes]
+        return [_with(solution, spindle.with_mode(omega_n, shape, zeta)) for omega_n, zeta, shape in modes]
 
 
 POSED = PosedSteps()
@@ -53,12 +47,11 @@ def layout_of(layout: Unknowns) -> PosedLayout:
     return layout
 
 
-def _spindle(solution: Solution) -> CoupledParameters:
-    return unpack_robot(solution.theta, layout_of(solution.layout)).spindle
+def _spindle(solution: Solution) -> SpindleParameters:
+    return unpack(solution.theta, layout_of(solution.layout)).spindle
 
 
-def _with(solution: Solution, spindle: CoupledParameters) -> Trial:
+def _with(solution: Solution, spindle: SpindleParameters) -> Trial:
     old = layout_of(solution.layout)
-    layout = replace(old, spindle=replace(old.spindle, modes=spindle.order))
-    robot = replace(unpack_robot(solution.theta, old), spindle=spindle)
-    return np.concatenate([pack_robot(robot, layout), solution.theta[old.tail :]]), layout
+    robot = replace(unpack(solution.theta, old), spindle=spindle)
+    return np.concatenate([pack(robot), solution.theta[old.tail :]]), replace(old, modes=spindle.order)

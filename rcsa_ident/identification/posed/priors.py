@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.identification.coupled.priors import coupled_prior_rows
+from rcsa_ident.identification.parameters import DAMPING_UNIT, lower_triangle
 from rcsa_ident.identification.posed.parameters import PosedLayout
 from rcsa_ident.identification.priors import PriorRows, Priors
 from rcsa_ident.machine.robot.model import RobotModel
 
 #: Standard deviations of the logarithms of a drive's stiffness, of that across a joint's axis, and of a damper.
 DRIVE, TILT, DAMPER = 0.5, 0.7, 1.0
+#: Spread of what the housing's motion pulls a mode of the spindle with [sqrt(kg)]: a shaft of some kilograms.
+PULL = 2.0
 #: Damping over the root of the stiffness [sqrt(N m) s] where a data sheet has none: that of the arm of [huynh2020].
 _USUAL_DAMPING = 0.269
 
@@ -44,6 +47,7 @@ def arm_priors(robot: RobotModel, tilts: bool = True) -> ArmPriors:
     return ArmPriors(frozen(centre), frozen(np.concatenate([stiff, np.full(stiff.size, DAMPER)])))
 
 
+@lru_cache(maxsize=64)
 def posed_prior_rows(layout: PosedLayout, priors: ArmPriors, coefficients: tuple[float, ...] = ()) -> PriorRows:
     """Return the priors of a layout's unknowns.
 
@@ -54,11 +58,20 @@ def posed_prior_rows(layout: PosedLayout, priors: ArmPriors, coefficients: tuple
     coefficients : tuple of float
         Standard deviations of the logarithms of the cutting coefficients' scales.
     """
-    rest, first = coupled_prior_rows(layout.spindle, priors.spindle, coefficients), 2 * layout.freedoms
-    jacobian = np.zeros((first + rest.centre.size,) * 2)
-    jacobian[np.arange(first), np.arange(first)] = 1.0 / priors.spread
-    jacobian[first:, first:] = rest.jacobian
-    centre, spread = (np.concatenate(pair) for pair in ((priors.centre, rest.centre), (priors.spread, rest.spread)))
-    return PriorRows(
-        frozen(centre), frozen(spread), frozen(first + rest.own, np.intp), frozen(first + rest.frequency, np.intp), frozen(jacobian)
-    )
+    known, m = priors.spindle, layout.modes
+    diagonal = lower_triangle(m)[2]
+    centre, spread = np.zeros(layout.size), np.empty(layout.size)
+    arm = slice(0, 2 * layout.freedoms)
+    centre[arm], spread[arm] = priors.centre, priors.spread
+    centre[layout.frequencies], spread[layout.frequencies] = np.log(2.0 * np.pi * known.frequency_hz), known.frequency_spread
+    spread[layout.shapes], spread[layout.pulls] = known.shape, PULL
+    own = layout.factor.start + np.flatnonzero(diagonal)
+    spread[layout.factor] = np.where(diagonal, 0.5 * known.damping_spread, known.damping_coupling)
+    centre[own] = 0.5 * np.log(2.0 * known.damping_ratio) - np.log(DAMPING_UNIT)
+    spread[layout.residual] = known.residual
+    centre[layout.joint], spread[layout.joint] = np.log(known.joint), known.joint_spread
+    spread[layout.force], spread[layout.clamping] = coefficients, known.tooth_angle
+    frequency = np.arange(m) + layout.frequencies.start
+    jacobian = np.diag(1.0 / spread)
+    jacobian[own, frequency] = -0.5 / spread[own]
+    return PriorRows(frozen(centre), frozen(spread), frozen(own, np.intp), frozen(frequency, np.intp), frozen(jacobian))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import degrees
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -187,6 +187,9 @@ class Joint:
             raise InputError(f"limits of {self.name}", f"{low:g} to {high:g}°", "a lower limit below the upper one")
 
 
+_Spring = TypeVar("_Spring", Joint, Tilt)
+
+
 class Chain(NamedTuple):
     """The freedoms of a robot one after the other, as the kernels read them; see `rcsa_ident.machine.robot._kernels`.
 
@@ -311,6 +314,27 @@ class RobotModel(Shown):
             frozen([s.damping for s in springs]),
             frozen(driven, np.intp),
         )
+
+    def sprung(self, stiffness: FloatArray, damping: FloatArray, tilts: bool = True) -> RobotModel:
+        """Return the robot with other springs and dampers, one for each freedom in the order of `chain`.
+
+        Parameters
+        ----------
+        stiffness, damping : arrays, shape (n,) [N m/rad], [N m s/rad]
+        tilts : bool
+            Whether those across the joints' axes are among them.
+        """
+        springs = iter(zip(stiffness.tolist(), damping.tolist(), strict=True))
+
+        def with_next(each: _Spring) -> _Spring:
+            k, d = next(springs)
+            return replace(each, stiffness=k, damping=d)
+
+        joints = []
+        for joint in self.joints:
+            turning = with_next(joint)
+            joints.append(replace(turning, tilts=tuple(with_next(tilt) for tilt in joint.tilts)) if tilts else turning)
+        return replace(self, joints=tuple(joints))
 
     def posture(self, angles: FloatArray) -> FloatArray:
         """Return a posture as an array, shape (j,) [rad].

@@ -16,11 +16,11 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.errors import InputError
-from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
+from rcsa_ident.machine.flange_part import Doubtful, FlangePart, JointedFlange, OpenQuestion
 from rcsa_ident.machine.machine import Machine
-from rcsa_ident.machine.mode_synthesis import FLANGE, WHOLE_FLANGE
+from rcsa_ident.machine.mode_synthesis import WHOLE_FLANGE
 from rcsa_ident.machine.responses import in_plane
+from rcsa_ident.machine.robot.carried_spindle import CarriedSpindle
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
@@ -44,13 +44,14 @@ class PosedRobot(Machine):
     angles : array, shape (j,) [rad]
     turn : float [rad]
         Of the feed from the tool's x about the tool's axis: the tip's x is the feed.
-    spindle : TurningModes or None
-        Modes of the spindle in its own housing, over translation and slope of its flange in X, then in Y; their compliance adds to the
-        arm's. None takes the spindle for rigid.
+    spindle : CarriedSpindle or None
+        None takes the spindle for rigid.
     joint : LumpedJoint
         Between spindle and tool-holder.
     highest : float [rad/s]
         Up to which it is asked for.
+    doubtful : Doubtful or None
+        Who can tell what is not known of it at a posture; None takes it for exact.
 
     Examples
     --------
@@ -65,35 +66,30 @@ class PosedRobot(Machine):
     robot: FlexibleRobot
     angles: FloatArray
     turn: float = 0.0
-    spindle: TurningModes | None = None
+    spindle: CarriedSpindle | None = None
     joint: LumpedJoint = STIFF
     highest: float = field(default=from_hz(4500.0))
+    doubtful: Doubtful | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "angles", self.robot.model.posture(self.angles))
-        if self.spindle is not None and self.spindle.coordinates != FLANGE:
-            found = ", ".join(str(c) for c in self.spindle.coordinates)
-            raise InputError("spindle", found, f"modes over {', '.join(str(c) for c in FLANGE)}")
 
     @cached_property
     def flange(self) -> TurningModes:
-        """The modes where the tool-holder sits: the arm's, then the spindle's."""
-        structure = self.robot.at(self.angles, self.turn)
-        squares, shapes = scipy.linalg.eigh(structure.stiffness, structure.mass)
-        omega_n, damping, psi = np.sqrt(squares), shapes.T @ structure.damping @ shapes, shapes.T @ structure.ports
-        residual = np.zeros((6, 6))
+        """The modes where the tool-holder sits, of arm and spindle."""
+        structure, residual = self.robot.at(self.angles, self.turn), np.zeros((6, 6))
         if self.spindle is not None:
-            own = self.spindle
-            omega_n = np.concatenate([omega_n, own.omega_n])
-            damping = scipy.linalg.block_diag(damping, own.damping)
-            psi = np.concatenate([psi, np.pad(own.psi, ((0, 0), (0, 2)))])
-            residual[:4, :4] = own.residual
-        return TurningModes(omega_n, damping, np.zeros_like(damping), psi, residual, 0.0, WHOLE_FLANGE)
+            spindle = self.spindle.turned(self.turn) if self.turn else self.spindle
+            structure, residual[:4, :4] = spindle.on(structure), spindle.residual
+        squares, shapes = scipy.linalg.eigh(structure.stiffness, structure.mass)
+        damping = shapes.T @ structure.damping @ shapes
+        return TurningModes(np.sqrt(squares), damping, np.zeros_like(damping), shapes.T @ structure.ports, residual, 0.0, WHOLE_FLANGE)
 
     @cached_property
     def parts(self) -> tuple[FlangePart, ...]:
         """One: all six directions feel each other."""
-        return (FlangePart(WHOLE_FLANGE, JointedFlange(self.flange, self.joint)),)
+        doubt = None if self.doubtful is None else OpenQuestion(self.doubtful, (self.angles, self.turn))
+        return (FlangePart(WHOLE_FLANGE, JointedFlange(self.flange, self.joint), doubt),)
 
     @property
     def band(self) -> tuple[float, float]:

@@ -1,0 +1,187 @@
+"""A robot from its cuts: the arm from the lowest lines, then the spindle in its hand, as many modes as the evidence asks for.
+
+Below the spindle's own modes a robot has no other unknowns than its springs and dampers, and their number does not grow with that of the
+postures: a few dozen lines tell them, from any start within a factor of two. Only there the cuts' delays are free of chance, too. Each band
+above adds lines, and modes where the evidence wants them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.candidate import Candidate
+from rcsa_ident.identification.joint_fit import refine_and_learn_noise, tooth_angles
+from rcsa_ident.identification.levenberg_marquardt import Solution, refine
+from rcsa_ident.identification.model_order import Report, cut_weights, drop_modes, evidence, grow_modes, model_error
+from rcsa_ident.identification.parameters import JOINT, Unknowns
+from rcsa_ident.identification.posed.data import PosedData
+from rcsa_ident.identification.posed.misfit import PosedMisfit
+from rcsa_ident.identification.posed.modes import POSED, layout_of
+from rcsa_ident.identification.posed.parameters import DIRECTIONS, PosedLayout
+from rcsa_ident.identification.posed.priors import ArmPriors
+from rcsa_ident.identification.progress import Stage
+from rcsa_ident.identification.task import Phase, finite, perform
+from rcsa_ident.scaleout import Map
+from rcsa_ident.units import from_hz
+
+#: Up to which frequency a spindle is as good as rigid, and the tops of the bands that follow [Hz].
+ARM_BAND = 120.0
+BANDS = (240.0, 480.0, 960.0, 1500.0, 2200.0, 3200.0)
+#: Harmonics of the tooth passing above which a simulated force is a matter of the edges' last micrometres.
+MOST_HARMONICS = 30
+#: Model errors of the arm's fit, from coarse to fine; from `GRID` on the cuts' delays are looked for over all of a tooth passing.
+SHARES, GRID = (1.0, 0.3, 0.1, 0.03, 0.01), 0.1
+#: Model error with which a band begins, and the least one that it learns on the way.
+FIRST_SHARE, LEAST_SHARE = 0.02, 0.002
+#: Starts of the arm's fit: the data sheet's springs, and draws of what is believed of them.
+STARTS = 8
+#: Gain in evidence for which a mode is taken in.
+WORTH = 5.0
+_STEPS, _ROUGHLY = 60, 1e-3
+#: Residual compliance's factor where it begins, in its unit.
+_FIRST_RESIDUAL = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmStart:
+    """A fit of the arm alone, from one start; it answers with a `Candidate`.
+
+    Parameters
+    ----------
+    data : PosedData
+        Lines up to `ARM_BAND`, the flange's motion as the only output.
+    priors : ArmPriors
+    theta : array, shape (p,)
+        Where it begins, no mode of the spindle in it.
+    """
+
+    phase: ClassVar[Phase] = Phase.SEARCH
+    data: PosedData
+    priors: ArmPriors
+    theta: FloatArray
+
+    def run(self) -> Candidate:
+        """Refine from coarse to fine."""
+        theta, nuisance = self.theta, np.zeros((len(self.data.base.cut_ids), 2))
+        layout = PosedLayout(self.data.freedoms, 0, len(self.data.base.coefficient_spread))
+        for share in SHARES:
+            misfit = PosedMisfit(self.data, self.priors, (share, share))
+            found = refine(misfit, theta, layout, nuisance, _STEPS, grid=32 if share >= GRID else 0)
+            theta, nuisance = found.theta, found.evaluation.nuisance
+        return found.candidate
+
+
+def fit_robot(data: PosedData, priors: ArmPriors, seed: int, map: Map, report: Report) -> tuple[Solution, PosedMisfit, Solution]:
+    """Return arm and spindle as the cuts tell them, the misfit whose minimum they are, and a rival with one mode more.
+
+    Parameters
+    ----------
+    data : PosedData
+        Of all outputs.
+    priors : ArmPriors
+    seed : int
+        Of the starts.
+    map : callable
+        The builtin, or a pool's.
+    report : callable of (stage, cost, solution)
+
+    Raises
+    ------
+    InputError
+        If no line is low enough to tell the arm.
+    """
+    data = data.up_to_harmonic(MOST_HARMONICS)
+    summed = data.summed()
+    found, misfit = _spindle(summed, priors, _arm(summed, priors, seed, map), report)
+    found, misfit = _with_all_outputs(data, priors, found, misfit, report)
+    dropped = drop_modes(found, misfit, report, smallest=0, give_up=2.0 * WORTH, steps=POSED)
+    if evidence(dropped, misfit) < evidence(found, misfit):
+        found = dropped
+    rival = grow_modes(found, misfit, data.base.band_hz, POSED)
+    report(Stage.GROW, rival.cost, rival)
+    return found, misfit, rival
+
+
+def _arm(data: PosedData, priors: ArmPriors, seed: int, map: Map) -> Candidate:
+    """The best of several fits of the lowest lines."""
+    low = data.below(from_hz(ARM_BAND))
+    if low.omega.size < data.freedoms:
+        told = f"{low.omega.size} lines below {ARM_BAND:g} Hz"
+        allowed = f"at least {data.freedoms}: an arm's own modes lie there; a slow cut has tooth-passing harmonics among them"
+        raise InputError("cuts", told, allowed)
+    rng = np.random.default_rng(seed)
+    draws = np.concatenate([np.zeros((1, priors.centre.size)), rng.standard_normal((STARTS - 1, priors.centre.size))])
+    rest = [
+        _FIRST_RESIDUAL * np.eye(DIRECTIONS)[np.tril_indices(DIRECTIONS)],
+        np.log(priors.spindle.joint),
+        np.zeros(len(data.base.coefficient_spread)),
+    ]
+    starts = [ArmStart(low, priors, np.concatenate([priors.centre + draw * priors.spread, *rest])) for draw in draws]
+    return min(finite(map(perform, starts)), key=lambda each: each.cost)
+
+
+def _spindle(data: PosedData, priors: ArmPriors, arm: Candidate, report: Report) -> tuple[Solution, PosedMisfit]:
+    """Band by band upwards, the noise learned and modes taken in within each."""
+    point, weight = arm.point, np.ones(len(data.base.cut_ids))
+    for part in _bands(data):
+        shares = (FIRST_SHARE, FIRST_SHARE)
+        for _ in range(3):
+            misfit = PosedMisfit(part, priors, shares, weight)
+            found = refine(misfit, *point, _STEPS, tolerance=_ROUGHLY)
+            report(Stage.POLISH, found.cost, found)
+            found = _grown(found, misfit, part, report)
+            point, weight = found.candidate.point, cut_weights(found, misfit)
+            learned = tuple(float(np.clip(new, LEAST_SHARE, old)) for new, old in zip(model_error(found, misfit), shares, strict=True))
+            if all(abs(new / old - 1.0) < 0.2 for new, old in zip(learned, shares, strict=True)):
+                break
+            shares = learned
+    return found, misfit
+
+
+def _bands(data: PosedData) -> Iterator[PosedData]:
+    """The data up to the top of each band, those without further lines left out, all of it last."""
+    count = 0
+    for top in BANDS:
+        part = data.below(from_hz(top))
+        if count < part.omega.size < data.omega.size:
+            yield part
+        count = part.omega.size
+    yield data
+
+
+def _grown(found: Solution, misfit: PosedMisfit, data: PosedData, report: Report) -> Solution:
+    """The solution with as many more modes as are worth it."""
+    here = evidence(found, misfit)
+    while True:
+        grown = grow_modes(found, misfit, data.base.band_hz, POSED)
+        value = evidence(grown, misfit)
+        if value > here - WORTH:
+            return found
+        found, here = grown, value
+        report(Stage.GROW, found.cost, found)
+
+
+def _with_all_outputs(
+    data: PosedData, priors: ArmPriors, found: Solution, misfit: PosedMisfit, report: Report
+) -> tuple[Solution, PosedMisfit]:
+    """The same with gap and fixture apart and the triggers' tooth angles among the unknowns, polished until the noise stays."""
+
+    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> PosedMisfit:
+        return PosedMisfit(data, priors, shares, weight)
+
+    layout, nuisance = layout_of(found.layout), found.evaluation.nuisance
+    angles, nuisance = tooth_angles(data.base, nuisance) if data.base.clampings else (np.zeros(0), nuisance)
+    start: tuple[FloatArray, Unknowns, FloatArray] = (
+        np.concatenate([found.theta[: layout.tail + JOINT + layout.coefficients], angles]),
+        replace(layout, clampings=angles.size),
+        nuisance,
+    )
+    polished, last = refine_and_learn_noise(misfit_of, start, misfit.model_error, misfit.cut_weight, report, 1e-4)
+    assert isinstance(last, PosedMisfit)
+    return polished, last

@@ -1,0 +1,188 @@
+"""The answer of an identification of a robot: its posterior, and whether it may be used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.levenberg_marquardt import Solution
+from rcsa_ident.identification.posed.misfit import PosedMisfit
+from rcsa_ident.identification.posed.modes import layout_of
+from rcsa_ident.identification.posed.posterior import RobotPosterior, RobotUnknowns
+from rcsa_ident.identification.status import Status
+from rcsa_ident.machine.robot.model import RobotModel
+from rcsa_ident.remarks import Remark
+from rcsa_ident.shown import Shown
+
+#: Share of each line left unexplained above which the answer is suspect, and of the cuts that may contradict the others.
+WORST_MODEL_ERROR, MOST_BAD_CUTS = 0.02, 0.1
+#: Postures with fewer of which an answer is suspect.
+FEWEST_POSTURES = 3
+#: A spring is told by the cuts where its deviation is below this share of what was believed.
+TOLD = 0.5
+
+
+class RobotCode(StrEnum):
+    """What may be said of an identification of a robot."""
+
+    NOT_CONVERGED = "not-converged"
+    UNEXPLAINED = "unexplained"
+    CONTRADICTING_CUTS = "contradicting-cuts"
+    FEW_POSTURES = "few-postures"
+    ONE_TOOLING = "one-tooling"
+    SPRINGS_UNKNOWN = "springs-unknown"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RobotIdentification(Shown):
+    """What was found of a robot.
+
+    Parameters
+    ----------
+    status : Status
+    reasons, notes : tuples of Remark
+        Reasons for doubt, and what the data cannot tell.
+    seed : int
+    posterior : RobotPosterior
+    model_error : tuple of float [-]
+        Share of the lines of X and of Y that neither model nor noise explains.
+    chi2_per_point : float [-]
+    cut_ids : tuple of str
+    postures : array, shape (c, j) [rad]
+        Of the cuts, each once.
+    band_hz : (float, float) [Hz]
+    """
+
+    status: Status
+    reasons: tuple[Remark, ...]
+    notes: tuple[Remark, ...]
+    seed: int
+    posterior: RobotPosterior
+    model_error: tuple[float, ...]
+    chi2_per_point: float
+    cut_ids: tuple[str, ...]
+    postures: FloatArray
+    band_hz: tuple[float, float]
+
+    @property
+    def springs(self) -> tuple[tuple[str, float, float, bool], ...]:
+        """Name, stiffness [N m/rad], its deviation as a share, and whether the cuts tell it, of every freedom."""
+        posterior = self.posterior
+        spread = np.sqrt(np.diag(posterior.covariance))[posterior.best.layout.stiffness]
+        stiffness = np.exp(posterior.best.theta[posterior.best.layout.stiffness])
+        names = freedom_names(posterior.sheet, posterior.tilts)
+        believed = posterior.believed[posterior.best.layout.stiffness]
+        told = spread < TOLD * believed
+        return tuple(zip(names, stiffness.tolist(), spread.tolist(), told.tolist(), strict=True))
+
+    def __str__(self) -> str:
+        best = self.posterior.best.layout
+        told = sum(each[3] for each in self.springs)
+        return (
+            f"{self.posterior.sheet.name}, {self.status}: {told} of {best.freedoms} springs told, {best.modes} modes of the spindle, "
+            f"{len(self.cut_ids)} cuts at {len(self.postures)} postures"
+        )
+
+
+def freedom_names(robot: RobotModel, tilts: bool = True) -> tuple[str, ...]:
+    """Return a name for every freedom, in the order of `RobotModel.chain`: the joints', and theirs with the axis that a tilt turns about."""
+    names = []
+    for joint in robot.joints:
+        names.append(joint.name)
+        if tilts:
+            names += [f"{joint.name} about {_axis(tilt.axis)}" for tilt in joint.tilts]
+    return tuple(names)
+
+
+def _axis(axis: FloatArray) -> str:
+    along = int(np.argmax(np.abs(axis)))
+    return "xyz"[along] if abs(axis[along]) > 1.0 - 1e-9 else "({:.3g}, {:.3g}, {:.3g})".format(*axis)
+
+
+def answer(
+    sheet: RobotModel, tilts: bool, found: Solution, misfit: PosedMisfit, rival: Solution, seed: int, postures: FloatArray
+) -> RobotIdentification:
+    """Return what a fit has found, and the doubts about it.
+
+    Parameters
+    ----------
+    sheet : RobotModel
+    tilts : bool
+    found, rival : Solution
+    misfit : PosedMisfit
+        The one whose minimum `found` is.
+    seed : int
+    postures : array, shape (c, j) [rad]
+    """
+    covariance = np.linalg.inv(found.evaluation.hessian)
+    layout, data = layout_of(found.layout), misfit.data
+    own = layout.machine
+    prior = misfit.prior(layout).spread
+    best, other = (_unknowns(each) for each in (found, rival))
+    posterior = RobotPosterior(sheet, tilts, best, 0.5 * (covariance + covariance.T)[np.ix_(own, own)], prior[own], (other,))
+    chi2 = sum(found.evaluation.chi2) / misfit.points
+    result = RobotIdentification(Status.CONVERGED, (), (), seed, posterior, misfit.model_error, chi2, data.cut_ids, postures, data.band_hz)
+    reasons = _reasons(result, found, misfit)
+    notes = _notes(result)
+    return replace(result, status=Status.SUSPECT if reasons else Status.CONVERGED, reasons=tuple(reasons), notes=tuple(notes))
+
+
+def _unknowns(solution: Solution) -> RobotUnknowns:
+    layout = layout_of(solution.layout)
+    return RobotUnknowns(solution.theta[layout.machine], replace(layout, coefficients=0, clampings=0))
+
+
+def _reasons(result: RobotIdentification, found: Solution, misfit: PosedMisfit) -> list[Remark]:
+    reasons = []
+    if not found.converged:
+        words = f"not converged: the fit was still improving after {found.steps} steps"
+        reasons.append(Remark(RobotCode.NOT_CONVERGED, words))
+    for axis, share in zip(misfit.data.axes, result.model_error, strict=True):
+        if share > WORST_MODEL_ERROR:
+            words = (
+                f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained (limit "
+                f"{100 * WORST_MODEL_ERROR:g} %): cutting coefficients, toolings, postures, masses or lengths of the arm may be wrong"
+            )
+            reasons.append(Remark(RobotCode.UNEXPLAINED, words))
+    bad = misfit.cut_weight < 1.0
+    if np.mean(bad) > MOST_BAD_CUTS:
+        names = ", ".join(np.array(misfit.data.cut_ids)[bad][:5].tolist())
+        words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, among them {names}"
+        reasons.append(Remark(RobotCode.CONTRADICTING_CUTS, words))
+    if len(result.postures) < FEWEST_POSTURES:
+        words = f"cuts at {len(result.postures)} postures: at least {FEWEST_POSTURES} tell the joints apart, better 6"
+        reasons.append(Remark(RobotCode.FEW_POSTURES, words))
+    if len(misfit.data.toolings) < 2:
+        words = "only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder"
+        reasons.append(Remark(RobotCode.ONE_TOOLING, words))
+    return reasons
+
+
+def _notes(result: RobotIdentification) -> list[Remark]:
+    unknown = [name for name, _, _, told in result.springs if not told]
+    if not unknown:
+        return []
+    words = f"springs that these cuts do not tell, left near what the data sheet says: {', '.join(unknown)}"
+    return [Remark(RobotCode.SPRINGS_UNKNOWN, words)]
+
+
+def check_postures(postures: Sequence[tuple[float, ...]], ids: Sequence[str], robot: RobotModel) -> tuple[FloatArray, np.ndarray]:
+    """Return the postures of cuts, each once, and which of them each cut has; shapes (c, j) [rad], (k,).
+
+    Raises
+    ------
+    InputError
+        If a cut tells none, or one of another number of joints.
+    """
+    for id, posture in zip(ids, postures, strict=True):
+        if len(posture) != len(robot.joints):
+            found = f"{len(posture)} angles of cut {id}" if posture else f"nothing of cut {id}"
+            raise InputError("posture_deg", found, f"{len(robot.joints)} angles, one a joint [°], of every cut")
+    # a control tells its angles to a ten-thousandth of a degree
+    found, of_cut = np.unique(np.round(np.degrees(np.array(postures)), 4), axis=0, return_inverse=True)
+    return np.radians(found), of_cut.ravel()

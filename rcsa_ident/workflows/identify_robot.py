@@ -1,0 +1,105 @@
+"""From a campaign at several postures to a robot's springs and dampers and the spindle in its hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.force import axial_and_slope
+from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.model_order import Report
+from rcsa_ident.identification.posed.data import PosedData, posed_data
+from rcsa_ident.identification.posed.fit import fit_robot
+from rcsa_ident.identification.posed.priors import arm_priors
+from rcsa_ident.identification.posed.result import RobotIdentification, answer, check_postures
+from rcsa_ident.machine.robot.flexible import FlexibleRobot
+from rcsa_ident.machining_setup import Campaign
+from rcsa_ident.scaleout import Map
+from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.tool_holder.rods import rod_poles
+from rcsa_ident.workflows.identify import data_of
+
+
+def identify_robot(
+    campaign: Campaign, readings: Sequence[Reading], robot: FlexibleRobot, seed: int = 1, map: Map = map, report: Report | None = None
+) -> RobotIdentification:
+    """Return a robot as its cuts tell it.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Each cut with the posture that it was made at.
+    readings : sequence of Reading
+        As `identify.judge` returns them.
+    robot : FlexibleRobot
+        Lengths and masses, taken as exact, the whole spindle among the payload; springs and dampers as a first belief.
+    seed : int
+        Same seed, same answer.
+    map : callable
+        The builtin, or a pool's.
+    report : callable of (stage, cost, solution), optional
+
+    Raises
+    ------
+    InputError
+        If a cut tells no posture, if no cut is usable, or if none is slow enough to tell the arm.
+    """
+    data, postures = robot_data(campaign, readings, robot)
+    priors = arm_priors(robot.model, robot.tilts)
+    found, misfit, rival = fit_robot(data, priors, seed, map, _unheard if report is None else report)
+    return answer(robot.model, robot.tilts, found, misfit, rival, seed, postures)
+
+
+def robot_data(campaign: Campaign, readings: Sequence[Reading], robot: FlexibleRobot) -> tuple[PosedData, FloatArray]:
+    """Return what a robot is fitted to, and the postures of its cuts, shape (c, j) [rad]; parameters as of `identify_robot`."""
+    if not robot.model.weighed:
+        raise InputError("link masses", "nothing", "mass, centre and inertia of the links: without them nothing vibrates")
+    if campaign.rough:
+        campaign = replace(campaign, toolings={name: tooling.exact() for name, tooling in campaign.toolings.items()})
+    data = data_of(campaign, readings)
+    of_id = {cut.id: cut for cut in campaign.cuts}
+    postures, of_cut = check_postures([of_id[id].posture for id in data.cut_ids], data.cut_ids, robot.model)
+    beside = _Beside(campaign, data)
+    teeth = {name: tooling.cutter.teeth for name, tooling in campaign.toolings.items()}
+    return posed_data(data, robot, postures, of_cut, teeth, beside.rods, beside.axial), postures
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """What cuts in two bending planes leave aside: tool-holders along and about their axis, and the force along it."""
+
+    campaign: Campaign
+    data: IdentificationData
+
+    @cached_property
+    def _poles(self) -> dict[str, tuple[PoleResidue, PoleResidue]]:
+        highest = max(float(axis.omega.max()) for axis in self.data.axes)
+        assemblies = {name: self.campaign.toolings[name].assembly for name in self.data.toolings}
+        return {name: (rod_poles(each, highest), rod_poles(each, highest, twisting=True)) for name, each in assemblies.items()}
+
+    def rods(self, cut: int, omega: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Of `posed.data.Rods`."""
+        along, about = (each.receptance(omega).values for each in self._poles[self.data.toolings[self.data.cut_tooling[cut]]])
+        return along[:, 1, 1], about[:, 1, 1], along[:, 1, 0]
+
+    def axial(self, cut: int, orders: np.ndarray) -> tuple[ComplexArray, ComplexArray]:
+        """Of `posed.data.Axial`."""
+        made = next(each for each in self.campaign.cuts if each.id == self.data.cut_ids[cut])
+        cutter = self.campaign.toolings[made.tooling].cutter
+        force, slope = axial_and_slope(cutter, made.conditions, self.campaign.coefficients, orders)
+        # of all terms, those that the data have as unknowns; run-out moves the axial force as little as its lines are used for
+        columns = np.zeros((orders.size, len(self.data.coefficients)), dtype=complex)
+        for k, coefficient in enumerate(self.data.coefficients):
+            if not coefficient.tooling:
+                columns[:, k] = slope[coefficient.term]
+        return force, columns
+
+
+def _unheard(*step: object) -> None:
+    """Nobody asked to be told."""
