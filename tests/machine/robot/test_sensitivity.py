@@ -102,14 +102,14 @@ def test_natural_frequencies(tilts):
     def omega(other):
         return modes_of(FlexibleRobot(other, tilts).at(TABLE_7))[0]
 
-    # an eigenvalue is as exact as the largest one allows: larger steps than a resonance would bear
+    # an eigenvalue is as exact as the largest one allows, 1.6e4 rad/s: larger steps than a resonance would bear
     for i, k in enumerate(arm.chain(tilts).stiffness):
         by_hand = difference(lambda f, i=i: omega(changed(arm, i, f, tilts=tilts)), k, 1e-3)
-        np.testing.assert_allclose(k * stiffer[:, i], k * by_hand, atol=5e-6)
+        np.testing.assert_allclose(k * stiffer[:, i], k * by_hand, atol=2e-5)
     masses = [*(j.body.mass for j in arm.joints), arm.payload.mass]
     for b, mass in enumerate(masses):
         by_hand = difference(lambda f, b=b: omega(heavier(arm, b, f)), mass, 1e-3)
-        np.testing.assert_allclose(mass * more[:, b], mass * by_hand, atol=5e-6)
+        np.testing.assert_allclose(mass * more[:, b], mass * by_hand, atol=2e-5)
     # all springs stiffer by a share: frequencies higher by half of it, and lower by half of it with all masses
     np.testing.assert_allclose(stiffer @ arm.chain(tilts).stiffness, 0.5 * omega(arm), rtol=1e-9)
     np.testing.assert_allclose(more @ masses, -0.5 * omega(arm), rtol=1e-9)
