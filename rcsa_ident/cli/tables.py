@@ -34,6 +34,7 @@ from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
 if TYPE_CHECKING:
+    from rcsa_ident.identification.robot_static import StaticFit
     from rcsa_ident.workflows.learn_from_cuts import NextTest
     from rcsa_ident.workflows.robot_postures import RobotAtPosture
 
@@ -412,4 +413,20 @@ def show_joints(names: Sequence[str], found: JointFit, explained: Mapping[str, F
             f"{found.coulomb[i]:.0f}", f"{found.viscous[i]:.0f}", *(f"{100.0 * share[i]:.1f}" for share in explained.values()),
         )  # fmt: skip
         table.add_row(name, *("" if text == "nan" else text for text in numbers))
+    show(table)
+
+
+def show_springs(names: Sequence[str], found: StaticFit) -> None:
+    """Print what static tests told of an arm's springs, and of its drives' play."""
+    table = Table(title="Springs")
+    for name in ("spring", "stiffness [MN m/rad]", "± [%]", "told", "play [µrad]", "±"):
+        table.add_column(name, justify="left" if name in ("spring", "told") else "right")
+    chain, plays = found.robot.chain(), dict.fromkeys(range(len(names)), ("", ""))
+    doubt = found.deviation[len(names) :]
+    for k, joint, own in zip(chain.driven.tolist(), found.robot.joints, doubt, strict=True):
+        plays[k] = f"{1e6 * joint.backlash:.0f}", f"{1e6 * own:.0f}"
+    group = {i: str(number) for number, members in enumerate(found.together, start=1) for i in members}
+    for i, name in enumerate(names):
+        told = "yes" if found.told[i] else f"in sum {group[i]}" if i in group else "no"
+        table.add_row(name, f"{1e-6 * chain.stiffness[i]:.3g}", f"{100.0 * found.share[i]:.0f}", told, *plays[i])
     show(table)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import degrees
 from typing import NamedTuple
@@ -312,6 +312,23 @@ class RobotModel(Shown):
             frozen(driven, np.intp),
         )
 
+    def spring_names(self, tilts: bool = True) -> tuple[str, ...]:
+        """Return what each freedom's spring is called, in the order of the chain: the joint's name, or that and across which axis."""
+        said = []
+        for joint in self.joints:
+            said.append(joint.name)
+            said += [f"{joint.name} about {_axis_name(tilt.axis)}" for tilt in (joint.tilts if tilts else ())]
+        return tuple(said)
+
+    def with_springs(self, stiffness: FloatArray, tilts: bool = True) -> RobotModel:
+        """Return the robot with other stiffnesses of its freedoms, shape (n,) [N m/rad], in the order of the chain."""
+        values, joints = iter(np.asarray(stiffness, dtype=float).tolist()), []
+        for joint in self.joints:
+            own = next(values)
+            across = tuple(replace(tilt, stiffness=next(values)) for tilt in joint.tilts) if tilts else joint.tilts
+            joints.append(replace(joint, stiffness=own, tilts=across))
+        return replace(self, joints=tuple(joints))
+
     def posture(self, angles: FloatArray) -> FloatArray:
         """Return a posture as an array, shape (j,) [rad].
 
@@ -348,6 +365,11 @@ def turned_within(angle: float, limits: tuple[float, float], near: float = 0.0) 
     turns = np.arange(-3, 4) * 2.0 * np.pi + np.arctan2(np.sin(angle), np.cos(angle))
     within = turns[(turns >= low) & (turns <= high)]
     return float(within[np.argmin(np.abs(within - near))]) if within.size else np.nan
+
+
+def _axis_name(axis: FloatArray) -> str:
+    along = np.flatnonzero(np.abs(axis) > 1.0 - _ROUNDED)
+    return "xyz"[along[0]] if along.size else ", ".join(f"{v:.3g}" for v in axis)
 
 
 def _unit(name: str, axis: FloatArray) -> FloatArray:
