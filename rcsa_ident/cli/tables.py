@@ -430,3 +430,19 @@ def show_springs(names: Sequence[str], found: StaticFit) -> None:
         told = "yes" if found.told[i] else f"in sum {group[i]}" if i in group else "no"
         table.add_row(name, f"{1e-6 * chain.stiffness[i]:.3g}", f"{100.0 * found.share[i]:.0f}", told, *plays[i])
     show(table)
+
+
+def show_planned_postures(postures: FloatArray, places: FloatArray, unknowns: Sequence[str], left: FloatArray) -> None:
+    """Print planned postures [rad] with their tool's places [m], and the share of each unknown's doubt that they leave."""
+    table = Table(title="Postures [°], and the tool there [mm]")
+    for name in (*(f"q{k}" for k in range(1, postures.shape[1] + 1)), "x", "y", "z"):
+        table.add_column(name, justify="right")
+    for posture, place in zip(postures, places, strict=True):
+        table.add_row(*(f"{v:.1f}" for v in np.degrees(posture)), *(f"{v:.0f}" for v in 1e3 * place))
+    show(table)
+    table = Table(title="Doubt that is left [% of what is believed]")
+    table.add_column("unknown")
+    table.add_column("", justify="right")
+    for name, share in zip(unknowns, left, strict=True):
+        table.add_row(name, f"{100.0 * share:.2g}" if share < 0.1 else f"{100.0 * share:.0f}")
+    show(table)

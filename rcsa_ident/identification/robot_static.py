@@ -185,7 +185,7 @@ def fit_static(robot: RobotModel, tests: Sequence[StaticTests]) -> StaticFit:
             raise InputError(f"tests {each.name}", f"{each.angles.shape[1]} joints", f"{len(robot.joints)}, as the robot has")
     pushed = [_Pushed.of(robot, each) for each in tests]
     before, n = _parameters(robot), robot.freedoms()
-    spread = np.concatenate([BELIEVED * before[:n], np.maximum(before[n:], PLAY)])
+    spread = _beliefs(before, n)
     # springs stay springs, and play is none where noise would have it less
     lowest = np.concatenate([before[:n] / _STIFFEST, np.zeros(before.size - n)])
     turns = any(each.displacement.shape[1] == 6 for each in tests)
@@ -202,6 +202,28 @@ def fit_static(robot: RobotModel, tests: Sequence[StaticTests]) -> StaticFit:
     covariance = np.linalg.inv(normal) * np.outer(spread, spread)
     told = float(noise[0]), float(noise[1]) if turns else np.nan
     return StaticFit(replace(arm, joints=joints), covariance, spread, told, ratio)
+
+
+def expected_information(robot: RobotModel, tests: StaticTests, noise: float = REPEATABILITY, turns: float = TURNS) -> FloatArray:
+    """Return what tests would tell of the compliances and plays, in units of what is believed of them, shape (n + j, n + j).
+
+    Parameters
+    ----------
+    robot : RobotModel
+    tests : StaticTests
+        What their displacements are does not matter.
+    noise, turns : float [m, rad]
+        Scatter of a reading of a place and of a turn; a zero's is the same.
+    """
+    spread = _beliefs(_parameters(robot), robot.freedoms())
+    _, slopes, _ = _Pushed.of(robot, tests).whitened(spread, np.array([noise, turns]), 1.0)
+    slopes = slopes * spread
+    return slopes.T @ slopes
+
+
+def _beliefs(before: FloatArray, n: int) -> FloatArray:
+    """Standard deviations before the tests, shape (n + j,)."""
+    return np.concatenate([BELIEVED * before[:n], np.maximum(before[n:], PLAY)])
 
 
 def _parameters(robot: RobotModel) -> FloatArray:
