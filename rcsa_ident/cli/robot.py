@@ -65,6 +65,8 @@ def check(
                 "damping_ratios": found.damping_ratios.tolist(),
                 "gravity_torque_nm": found.gravity_torques.tolist(),
                 "tcp_compliance_m_per_n": found.compliance.tolist(),
+                "sag_m": found.sag.tolist(),
+                "play_m": found.play.tolist(),
                 "postures_deg": np.degrees(found.postures).tolist(),
                 "warnings": warnings,
             }

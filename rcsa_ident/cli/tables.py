@@ -390,8 +390,13 @@ def show_robot(found: RobotAtPosture, allowed: Sequence[bool]) -> None:
         show(table)
         torques = ", ".join(f"{v:.0f}" for v in found.gravity_torques.round() + 0.0)
         console().print(f"torques against the arm's weight: {torques} N m")
+        sunk = ", ".join(f"{v:.3f}" for v in (1e3 * found.sag).round(3) + 0.0)
+        console().print(f"under it the tool moves by {sunk} mm along the base's axes, what the control takes out left out")
     else:
         console().print("no masses are known: no natural frequencies")
+    if np.any(found.play):
+        free = ", ".join(f"{v:.3f}" for v in 1e3 * found.play)
+        console().print(f"the joints' play lets it stand up to {free} mm from the middle")
     table = Table(title="Postures that bring the tool there [°]")
     for k in range(found.postures.shape[1]):
         table.add_column(f"{k + 1}", justify="right")

@@ -38,6 +38,15 @@ def sag(robot: RobotModel, angles: FloatArray, tilts: bool = True, payload: bool
     return chain.jacobian(chain.flange.point(robot.tool_point.offset)) @ bent
 
 
+def free_play(robot: RobotModel, angles: FloatArray) -> FloatArray:
+    """Return how far the tool's place may stand from the middle where all plays lie on the worst side, shape (6,) [m, rad].
+
+    Translations and rotations along the base's axes, |J| s: what no force on the tool is asked for.
+    """
+    chain = posed(robot, angles)
+    return np.abs(chain.jacobian(chain.flange.point(robot.tool_point.offset))) @ np.array([joint.backlash for joint in robot.joints])
+
+
 def twist_per_payload(robot: RobotModel, angles: FloatArray) -> FloatArray:
     """Return how far each drive's spring gives way for every kilogram that the payload weighs more, shape (j,) [rad/kg].
 

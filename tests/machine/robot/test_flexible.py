@@ -1,13 +1,14 @@
 """Arms that give way: natural frequencies and compliances that others computed or printed, and the spindle coupled to a bare arm."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.structure import poles
 from rcsa_ident.errors import InputError
-from rcsa_ident.machine.robot.compliance import sag, spring_torques, static_compliance, twist_per_payload
+from rcsa_ident.machine.robot.compliance import free_play, sag, spring_torques, static_compliance, twist_per_payload
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques, mass_matrix
 from rcsa_ident.machine.robot.kinematics import flange_at, posed, postures_of, tool_point_at
@@ -114,6 +115,15 @@ def test_play_is_felt_on_both_sides_alike():
     torque = spring_torques(arm, twist, np.zeros(18))
     np.testing.assert_allclose(torque[[0, 3, 6]], [0.0, -6.02e6 * 2.7e-5, 1.91e6 * 2.7e-5], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(spring_torques(arm, 0.0 * twist, np.ones(18))[[0, 1]], [-383.3, -1000.0])
+
+
+def test_free_play_is_the_farthest_corner_of_all_plays():
+    arm, corners = robot("tx200"), np.array(list(product((-1.0, 1.0), repeat=6)))
+    motion = posed(arm, TABLE_7).jacobian(tool_point_at(arm, TABLE_7).offset)
+    farthest = np.max(np.abs(corners * 7.3e-5 @ motion.T), axis=0)
+    np.testing.assert_allclose(free_play(arm, TABLE_7), farthest, rtol=1e-12)
+    # about a tenth of a millimetre, as others found of such plays
+    assert 5e-5 < free_play(arm, TABLE_7)[:3].max() < 3e-4
 
 
 @pytest.mark.parametrize("tilts", [False, True])
