@@ -23,6 +23,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.robot.compliance import PLAY_HELD
 from rcsa_ident.machine.robot.inertia import gravity_torques
 from rcsa_ident.machine.robot.kinematics import posed
 from rcsa_ident.machine.robot.model import RobotModel
@@ -33,8 +34,6 @@ BELIEVED, PLAY = 1.0, 2e-5
 #: Scatter of a robot's readings as measured [bauer2013], of places [m] and turns [rad], standard deviation of its logarithm, and of that
 #: of the ratio of a zero's scatter to a reading's.
 REPEATABILITY, TURNS, SCATTER, ZERO = 6e-5, 6e-5, 1.0, 0.7
-#: Torque [N m] that holds a play on its side.
-_HELD = 10.0
 #: No spring is stiffer than the file's by more.
 _STIFFEST = 10.0
 #: A compliance above so many standard deviations is told; others whose doubts go together are told together, if the tests tell of them.
@@ -302,4 +301,4 @@ class _Pushed:
 
 def _side(torque: FloatArray, before: FloatArray) -> FloatArray:
     """Where plays lie: on the side where the torque holds them, else where they lay before."""
-    return np.where(np.abs(torque) > _HELD, np.sign(torque), before)
+    return np.where(np.abs(torque) > PLAY_HELD, np.sign(torque), before)
