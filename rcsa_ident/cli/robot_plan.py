@@ -24,6 +24,7 @@ class TestsName(StrEnum):
     """What is measured at the postures, by name."""
 
     static = "static"
+    modes = "modes"
     encoders = "encoders"
     payload = "payload"
 
@@ -36,7 +37,8 @@ def plan(
     tests: Annotated[
         TestsName,
         typer.Option(
-            help="static: forces and displacements of the tool, for all springs and plays; encoders: twist of the drives under the arm's "
+            help="static: forces and displacements of the tool, for all springs and plays; modes: natural frequencies from "
+            "taps, for all springs; encoders: twist of the drives under the arm's "
             "weight, for their stiffness; payload: the same, for the payload's mass."
         ),
     ] = TestsName.static,
@@ -53,6 +55,7 @@ def plan(
     ] = "200",
     force_n: Annotated[float, typer.Option(help="Largest force of a static test, N.")] = 1000.0,
     noise_mm: Annotated[float, typer.Option(help="Scatter of a displacement, mm.")] = 0.06,
+    frequency_noise_percent: Annotated[float, typer.Option(help="Scatter of a natural frequency, %.")] = 0.5,
     encoder_noise_urad: Annotated[float, typer.Option(help="Scatter of a joint's encoder, µrad.")] = 1.0,
     seed: Seed = 0,
     json_: Json = False,
@@ -69,6 +72,8 @@ def plan(
     arm = read_robot(robot)
     if tests is TestsName.static:
         experiment = robot_design.static_tests(arm, force_n, 1e-3 * noise_mm)
+    elif tests is TestsName.modes:
+        experiment = robot_design.natural_frequencies(arm, 1e-2 * frequency_noise_percent)
     elif tests is TestsName.encoders:
         experiment = robot_design.encoders_at_rest(arm, 1e-6 * encoder_noise_urad)
     else:

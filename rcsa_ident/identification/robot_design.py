@@ -18,12 +18,14 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.identification.experiment_design import d_optimal
 from rcsa_ident.identification.robot_static import REPEATABILITY, StaticTests, expected_information
 from rcsa_ident.machine.robot.compliance import twist_per_payload
+from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques
 from rcsa_ident.machine.robot.kinematics import posed, tool_point_at
 from rcsa_ident.machine.robot.model import RobotModel
+from rcsa_ident.machine.robot.sensitivity import frequency_slopes
 
-#: Scatter of a joint's encoder [rad].
-ENCODER = 1e-6
+#: Scatter of a joint's encoder [rad], and of a natural frequency as a share; so many of these are heard.
+ENCODER, FREQUENCY, MODES = 1e-6, 5e-3, 8
 #: Shares of the largest force with which each axis is pushed, one after the other: levels tell play and spring apart.
 LEVELS = (0.5, 1.0, -0.5, -1.0)
 #: Steps that bring a drawn posture's tool into the box, their damping [m], postures drawn for each that is wanted, and before giving up.
@@ -101,6 +103,35 @@ def encoders_at_rest(robot: RobotModel, noise: float = ENCODER) -> Experiment:
         return np.diag((gravity_torques(robot, posture) / stiffness / noise) ** 2)
 
     return Experiment(robot.spring_names(tilts=False), np.eye(len(robot.joints)), information)
+
+
+def natural_frequencies(robot: RobotModel, noise: float = FREQUENCY) -> Experiment:
+    """Return taps on the standing arm that tell its lowest natural frequencies.
+
+    Unknowns are the compliances of all freedoms, in units of the file's, to which they are believed.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    noise : float
+        Scatter of a natural frequency as a share of it.
+
+    Raises
+    ------
+    InputError
+        If no masses are known.
+    """
+    positive("frequency noise", noise, "share")
+    arm, stiffness = FlexibleRobot(robot), robot.chain().stiffness
+
+    def information(posture: FloatArray) -> FloatArray:
+        omega, (stiffer, _) = modes_of(arm.at(posture))[0], frequency_slopes(arm, posture)
+        slopes = (stiffer * stiffness / omega[:, None])[:MODES] / noise
+        return slopes.T @ slopes
+
+    # an arm without masses is refused here, and not only at the first posture
+    information(np.zeros(len(robot.joints)))
+    return Experiment(robot.spring_names(), np.eye(stiffness.size), information)
 
 
 def payload_mass(robot: RobotModel, noise: float = ENCODER) -> Experiment:

@@ -34,6 +34,8 @@ BELIEVED, PLAY = 1.0, 2e-5
 #: Scatter of a robot's readings as measured [bauer2013], of places [m] and turns [rad], standard deviation of its logarithm, and of that
 #: of the ratio of a zero's scatter to a reading's.
 REPEATABILITY, TURNS, SCATTER, ZERO = 6e-5, 6e-5, 1.0, 0.7
+#: How far the search for scatter goes from what is believed, in standard deviations: a micrometre to three millimetres.
+_FARTHEST = (-4.0, 4.0)
 #: No spring is stiffer than the file's by more.
 _STIFFEST = 10.0
 #: A compliance above so many standard deviations is told; others whose doubts go together are told together, if the tests tell of them.
@@ -188,8 +190,11 @@ def fit_static(robot: RobotModel, tests: Sequence[StaticTests]) -> StaticFit:
     # springs stay springs, and play is none where noise would have it less
     lowest = np.concatenate([before[:n] / _STIFFEST, np.zeros(before.size - n)])
     turns = any(each.displacement.shape[1] == 6 for each in tests)
+    # a first step of half of what is believed: the method's own, a quarter of a thousandth, ends where it begins
+    simplex = np.vstack([np.zeros(3 if turns else 2), 0.5 * np.eye(3 if turns else 2)])
+    search = {"initial_simplex": simplex, "xatol": 0.01, "fatol": 0.01}
     scatter = minimize(
-        _surprise, np.zeros(3 if turns else 2), (pushed, before, spread), method="Nelder-Mead", options={"xatol": 0.01, "fatol": 0.01}
+        _surprise, simplex[0], (pushed, before, spread), "Nelder-Mead", bounds=[_FARTHEST] * len(simplex[0]), options=search
     ).x
     _, normal, right = _normal(scatter, pushed, before, spread)
     factor = np.linalg.cholesky(normal)
@@ -215,7 +220,7 @@ def expected_information(robot: RobotModel, tests: StaticTests, noise: float = R
         Scatter of a reading of a place and of a turn; a zero's is the same.
     """
     spread = _beliefs(_parameters(robot), robot.freedoms())
-    _, slopes, _ = _Pushed.of(robot, tests).whitened(spread, np.array([noise, turns]), 1.0)
+    _, slopes, _ = _Pushed.of(robot, tests).whitened(np.zeros_like(spread), np.array([noise, turns]), 1.0)
     slopes = slopes * spread
     return slopes.T @ slopes
 

@@ -65,6 +65,16 @@ def test_what_encoders_do_not_tell_is_said(tmp_path):
     assert "no --box is given" in warnings[-1]
 
 
+def test_natural_frequencies(tmp_path):
+    out = tmp_path / "P.csv"
+    found = run("robot", "plan", TX200, "--tests", "modes", "--count", 3, "--candidates", 3, "--box", BOX, "--out", out, "--json")
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert len(told["unknowns"]) == 18
+    assert len(rows_of(out)) == 3
+    assert min(told["sd_after"]) < 0.1
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -76,6 +86,7 @@ def test_what_encoders_do_not_tell_is_said(tmp_path):
         (("--candidates", "BEYOND.csv"), "BEYOND.csv line 3: posture: found J2 stands at 150.00°"),
         (("--candidates", "BEYOND.csv", "--box", BOX), "line 3"),
         (("--tests", "payload", "--encoder-noise-urad", 0), "encoder noise"),
+        (("--tests", "modes", "--frequency-noise-percent", 0), "frequency noise"),
     ],
 )
 def test_bad_input_is_named(arguments, message, tmp_path, monkeypatch):

@@ -14,12 +14,14 @@ from rcsa_ident.identification.robot_design import (
     Reach,
     best_of,
     encoders_at_rest,
+    natural_frequencies,
     payload_mass,
     plan_postures,
     static_tests,
 )
 from rcsa_ident.identification.robot_static import fit_static
 from rcsa_ident.machine.robot.compliance import static_compliance
+from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.kinematics import tool_point_at
 from tests.fixtures import pushed_arm
 from tests.fixtures.robots import TABLE_7, robot
@@ -138,8 +140,28 @@ def test_encoders_under_weight_tell_nothing_of_an_upright_axis():
     assert np.all(after[1:] < 0.05)
 
 
+def test_natural_frequencies_beside_frequencies_of_changed_arms():
+    """What they tell is their change with each spring, in scatters of half a percent."""
+    arm = robot("tx200")
+    told = natural_frequencies(arm).information(TABLE_7)
+    springs, slopes = arm.chain().stiffness, []
+    for i in range(springs.size):
+        omega = []
+        for share in (1e-3, -1e-3):
+            changed = springs.copy()
+            changed[i] *= 1.0 + share
+            omega.append(modes_of(FlexibleRobot(arm.with_springs(changed)).at(TABLE_7))[0][:8])
+        slopes.append(np.log(omega[0] / omega[1]) / 2e-3 / 5e-3)
+    np.testing.assert_allclose(told, np.array(slopes) @ np.array(slopes).T, atol=1e-4 * told.max())
+    planned = plan_postures(natural_frequencies(arm), Reach(arm, PUBLISHED), 2, 40, 9)
+    drawn = best_of(natural_frequencies(arm), Reach(arm, PUBLISHED).draw(2, np.random.default_rng(9)), 2)
+    assert planned.gain > drawn.gain + 1.0
+
+
 def test_bad_plans_are_named():
     arm = robot("kr500")
+    with pytest.raises(InputError, match="link masses"):
+        natural_frequencies(arm)
     with pytest.raises(InputError, match="link masses"):
         encoders_at_rest(arm)
     with pytest.raises(InputError, match="payload"):

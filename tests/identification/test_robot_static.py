@@ -63,6 +63,17 @@ def test_springs_and_compliances_at_other_postures_within_their_bands(exact):
     assert np.max(errors) < 0.05
 
 
+@pytest.mark.parametrize("noise", [2e-5, 6e-5, 2e-4])
+def test_scatter_of_readings_and_zeros_is_learnt(exact, noise):
+    """Below, at and above what is believed; a zero scatters as a reading does, and by the play that nothing holds.
+
+    What weight and force stiffen, some 8 µm here, is taken for scatter.
+    """
+    found = fit_static(TRUTH, [scattered(exact, noise, np.random.default_rng(4))])
+    assert found.noise[0] == pytest.approx(noise, rel=0.15)
+    assert 0.5 < found.zero * noise / np.hypot(noise, 4e-5) < 2.0
+
+
 def test_what_weight_and_force_stiffen_is_small():
     """A kilonewton on an arm of 1.2 t that has no play: what is left out leaves compliances within two thousandths."""
     tight = replace(TRUTH, joints=tuple(replace(j, backlash=0.0) for j in TRUTH.joints))
