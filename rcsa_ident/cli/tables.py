@@ -34,6 +34,7 @@ from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
 if TYPE_CHECKING:
+    from rcsa_ident.identification.robot_static import StaticFit
     from rcsa_ident.workflows.learn_from_cuts import NextTest
     from rcsa_ident.workflows.robot_postures import RobotAtPosture
 
@@ -389,8 +390,13 @@ def show_robot(found: RobotAtPosture, allowed: Sequence[bool]) -> None:
         show(table)
         torques = ", ".join(f"{v:.0f}" for v in found.gravity_torques.round() + 0.0)
         console().print(f"torques against the arm's weight: {torques} N m")
+        sunk = ", ".join(f"{v:.3f}" for v in (1e3 * found.sag).round(3) + 0.0)
+        console().print(f"under it the tool moves by {sunk} mm along the base's axes, what the control takes out left out")
     else:
         console().print("no masses are known: no natural frequencies")
+    if np.any(found.play):
+        free = ", ".join(f"{v:.3f}" for v in 1e3 * found.play)
+        console().print(f"the joints' play lets it stand up to {free} mm from the middle")
     table = Table(title="Postures that bring the tool there [°]")
     for k in range(found.postures.shape[1]):
         table.add_column(f"{k + 1}", justify="right")
@@ -412,4 +418,36 @@ def show_joints(names: Sequence[str], found: JointFit, explained: Mapping[str, F
             f"{found.coulomb[i]:.0f}", f"{found.viscous[i]:.0f}", *(f"{100.0 * share[i]:.1f}" for share in explained.values()),
         )  # fmt: skip
         table.add_row(name, *("" if text == "nan" else text for text in numbers))
+    show(table)
+
+
+def show_springs(names: Sequence[str], found: StaticFit) -> None:
+    """Print what static tests told of an arm's springs, and of its drives' play."""
+    table = Table(title="Springs")
+    for name in ("spring", "stiffness [MN m/rad]", "± [%]", "told", "play [µrad]", "±"):
+        table.add_column(name, justify="left" if name in ("spring", "told") else "right")
+    chain, plays = found.robot.chain(), dict.fromkeys(range(len(names)), ("", ""))
+    doubt = found.deviation[len(names) :]
+    for k, joint, own in zip(chain.driven.tolist(), found.robot.joints, doubt, strict=True):
+        plays[k] = f"{1e6 * joint.backlash:.0f}", f"{1e6 * own:.0f}"
+    group = {i: str(number) for number, members in enumerate(found.together, start=1) for i in members}
+    for i, name in enumerate(names):
+        told = "yes" if found.told[i] else f"in sum {group[i]}" if i in group else "no"
+        table.add_row(name, f"{1e-6 * chain.stiffness[i]:.3g}", f"{100.0 * found.share[i]:.0f}", told, *plays[i])
+    show(table)
+
+
+def show_planned_postures(postures: FloatArray, places: FloatArray, unknowns: Sequence[str], left: FloatArray) -> None:
+    """Print planned postures [rad] with their tool's places [m], and the share of each unknown's doubt that they leave."""
+    table = Table(title="Postures [°], and the tool there [mm]")
+    for name in (*(f"q{k}" for k in range(1, postures.shape[1] + 1)), "x", "y", "z"):
+        table.add_column(name, justify="right")
+    for posture, place in zip(postures, places, strict=True):
+        table.add_row(*(f"{v:.1f}" for v in np.degrees(posture)), *(f"{v:.0f}" for v in 1e3 * place))
+    show(table)
+    table = Table(title="Doubt that is left [% of what is believed]")
+    table.add_column("unknown")
+    table.add_column("", justify="right")
+    for name, share in zip(unknowns, left, strict=True):
+        table.add_row(name, f"{100.0 * share:.2g}" if share < 0.1 else f"{100.0 * share:.0f}")
     show(table)

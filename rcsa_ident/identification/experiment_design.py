@@ -194,6 +194,40 @@ def exchanged(prospects: CandidateCuts, chosen: Sequence[int], goal: Goal, passe
     return greedy(prospects, len(cuts), goal, cuts)
 
 
+def d_optimal(information: Sequence[FloatArray], count: int, prior: FloatArray, passes: int = 20) -> list[int]:
+    """Return the candidates, cuts or whatever tells something, after which the unknowns' posterior has the smallest volume.
+
+    Greedy choice, then exchange, of det(prior + sum of the chosen information); the most telling first, none twice.
+
+    Parameters
+    ----------
+    information : sequence of k arrays, shape (p, p)
+        What each candidate tells, S^T Sigma^-1 S with S the slopes of its readings with the unknowns and Sigma their covariance.
+    count : int
+    prior : array, shape (p, p)
+        What is known before, positive definite.
+    passes : int
+        Rounds of exchange at most.
+
+    Examples
+    --------
+    Two candidates that tell one unknown, one that tells the other:
+
+    >>> one, other = np.diag([4.0, 0.0]), np.diag([0.0, 1.0])
+    >>> d_optimal([one, 0.9 * one, other], 2, np.eye(2))
+    [0, 2]
+    """
+    factor = np.linalg.cholesky(prior)
+    rows = []
+    for each in information:
+        half = scipy.linalg.solve_triangular(factor, each, lower=True, check_finite=False)
+        values, vectors = np.linalg.eigh(scipy.linalg.solve_triangular(factor, half.T, lower=True, check_finite=False))
+        kept = values > LEAST_INFORMATION
+        rows.append((vectors[:, kept] * np.sqrt(values[kept])).T)
+    prospects = CandidateCuts(tuple(rows), (np.eye(len(prior)),), (0.0,), np.eye(len(rows), dtype=bool))
+    return exchanged(prospects, greedy(prospects, count, Volume()), Volume(), passes)
+
+
 def deviations(prospects: CandidateCuts, order: Sequence[int]) -> FloatArray:
     """Return the relative standard deviation of each target before and after each of some cuts, shape (n + 1, targets)."""
     return np.array([prospects.deviation(prospects.covariance(order[:n])) for n in range(len(order) + 1)])

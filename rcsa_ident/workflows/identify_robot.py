@@ -23,6 +23,7 @@ from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.rods import rod_poles
+from rcsa_ident.tool_holder.spread import EXACT
 from rcsa_ident.workflows.identify import data_of
 
 
@@ -61,7 +62,7 @@ def robot_data(campaign: Campaign, readings: Sequence[Reading], robot: FlexibleR
     if not robot.model.weighed:
         raise InputError("link masses", "nothing", "mass, centre and inertia of the links: without them nothing vibrates")
     if campaign.rough:
-        campaign = replace(campaign, toolings={name: tooling.exact() for name, tooling in campaign.toolings.items()})
+        campaign = replace(campaign, toolings={name: replace(tooling, spread=EXACT) for name, tooling in campaign.toolings.items()})
     data = data_of(campaign, readings)
     of_id = {cut.id: cut for cut in campaign.cuts}
     postures, of_cut = check_postures([of_id[id].posture for id in data.cut_ids], data.cut_ids, robot.model)

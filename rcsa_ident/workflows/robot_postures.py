@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.machine.robot.compliance import static_compliance
+from rcsa_ident.machine.robot.compliance import free_play, sag, static_compliance
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques
 from rcsa_ident.machine.robot.kinematics import flange_at, postures_of, tool_point_at
@@ -36,6 +36,10 @@ class RobotAtPosture:
         That hold the arm; empty likewise.
     compliance : array, shape (3, 3) [m/N]
         At rest, at the tool point in the base's axes.
+    sag : array, shape (3,) [m]
+        How far the tool point sinks under the arm's weight, what the control takes out left out; empty where no masses are known.
+    play : array, shape (3,) [m]
+        How far it may stand from the middle along each of the base's axes within the joints' play.
     postures : array, shape (s, j) [rad]
         All that bring the flange to the same place, within the joints' limits or not; the posture alone where the arm is not of the
         kind of which they are known.
@@ -46,6 +50,8 @@ class RobotAtPosture:
     damping_ratios: FloatArray
     gravity_torques: FloatArray
     compliance: FloatArray
+    sag: FloatArray
+    play: FloatArray
     postures: FloatArray
 
 
@@ -58,16 +64,18 @@ def at_posture(robot: FlexibleRobot, angles: FloatArray) -> RobotAtPosture:
     angles : array, shape (j,) [rad]
     """
     model, posture = robot.model, robot.model.posture(angles)
-    frequencies = ratios = torque = np.zeros(0)
+    frequencies = ratios = torque = sunk = np.zeros(0)
     if model.weighed:
         frequencies, ratios = modes_of(robot.at(posture))
         torque = gravity_torques(model, posture)
+        sunk = sag(model, posture, robot.tilts)[:3]
     try:
         others = postures_of(model, flange_at(model, posture), within_limits=False)
     except InputError:
         others = posture[None]
     compliance = static_compliance(model, posture, robot.tilts)[:3, :3]
-    return RobotAtPosture(tool_point_at(model, posture), frequencies, ratios, torque, compliance, others)
+    play = free_play(model, posture)[:3]
+    return RobotAtPosture(tool_point_at(model, posture), frequencies, ratios, torque, compliance, sunk, play, others)
 
 
 def following(robot: RobotModel, start: FloatArray, tips: FloatArray, axes: FloatArray, assembly: ToolAssembly) -> FloatArray:

@@ -11,6 +11,7 @@ from rcsa_ident.cli import app
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.robots import read_robot
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.machine.robot.compliance import free_play, sag
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from tests.fixtures import moving_arm
@@ -37,7 +38,7 @@ def test_check_tells_what_the_files_page_says():
     told = json.loads(found.stdout)
     assert set(told) == {
         "name", "degrees_of_freedom", "mass_kg", "tcp_m", "tcp_axes", "natural_frequencies_hz", "damping_ratios", "gravity_torque_nm",
-        "tcp_compliance_m_per_n", "postures_deg", "warnings",
+        "tcp_compliance_m_per_n", "sag_m", "play_m", "postures_deg", "warnings",
     }  # fmt: skip
     assert told["degrees_of_freedom"] == len(told["natural_frequencies_hz"]) == len(told["damping_ratios"]) == 18
     assert told["mass_kg"] == pytest.approx(1045.0)
@@ -46,6 +47,8 @@ def test_check_tells_what_the_files_page_says():
     np.testing.assert_allclose(told["natural_frequencies_hz"][:3], [11.754, 13.651, 22.228], rtol=1e-4)
     np.testing.assert_allclose(told["gravity_torque_nm"], [0.0, -1112.42, -80.73, 28.14, 138.99, 0.0], atol=6e-3)
     np.testing.assert_allclose(np.diag(told["tcp_compliance_m_per_n"]) * 1e6, [1.908, 1.821, 0.737], atol=6e-4)
+    np.testing.assert_allclose(told["sag_m"], sag(robot("tx200"), TABLE_7)[:3], rtol=1e-9)
+    np.testing.assert_allclose(told["play_m"], free_play(robot("tx200"), TABLE_7)[:3], rtol=1e-9)
     assert len(told["postures_deg"]) == 8
     assert any(text.startswith("J3 stands at -212.14°") for text in told["warnings"])
     six = json.loads(run("robot", "check", TX200, "--posture", POSTURE, "--joints-only", "--json").stdout)
@@ -57,12 +60,15 @@ def test_check_in_words():
     assert found.exit_code == 0, found.output
     assert "tool at 794.0, 184.7, 316.3 mm of the base, pointing along 0.000, 0.000, -1.000" in found.output
     assert "torques against the arm's weight: 0, -1112, -81, 28, 139, 0 N m" in found.output
+    assert "under it the tool moves by " in found.output
+    assert "the joints' play lets it stand up to " in found.output
     assert found.output.count(" yes ") == 2
     bare = run("robot", "check", ROBOTS / "kr500.toml")
     assert bare.exit_code == 0, bare.output
     assert "no masses are known: no natural frequencies" in bare.output
     told = json.loads(run("robot", "check", ROBOTS / "kr500.toml", "--json").stdout)
-    assert told["natural_frequencies_hz"] == told["gravity_torque_nm"] == []
+    assert told["natural_frequencies_hz"] == told["gravity_torque_nm"] == told["sag_m"] == []
+    assert told["play_m"] == [0.0, 0.0, 0.0]
     assert told["mass_kg"] is None
 
 

@@ -57,7 +57,7 @@ class RobotUnknowns:
     def arm(self, sheet: RobotModel, tilts: bool) -> FlexibleRobot:
         """Return the arm of a data sheet with these springs and dampers."""
         found = unpack(self.theta, self.layout)
-        return FlexibleRobot(sheet.sprung(found.stiffness, found.damping, tilts), tilts)
+        return FlexibleRobot(sheet.with_springs(found.stiffness, found.damping, tilts), tilts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -75,7 +75,7 @@ class RobotIdentification(Shown):
         posterior = self.posterior
         spread = np.sqrt(np.diag(posterior.covariance))[posterior.best.layout.stiffness]
         stiffness = np.exp(posterior.best.theta[posterior.best.layout.stiffness])
-        names = freedom_names(posterior.sheet, posterior.tilts)
+        names = posterior.sheet.spring_names(posterior.tilts)
         believed = posterior.believed[posterior.best.layout.stiffness]
         told = spread < TOLD * believed
         return tuple(zip(names, stiffness.tolist(), spread.tolist(), told.tolist(), strict=True))
@@ -87,21 +87,6 @@ class RobotIdentification(Shown):
             f"{self.posterior.sheet.name}, {self.status}: {told} of {best.freedoms} springs told, {best.modes} modes of the spindle, "
             f"{len(self.cut_ids)} cuts at {len(self.postures)} postures"
         )
-
-
-def freedom_names(robot: RobotModel, tilts: bool = True) -> tuple[str, ...]:
-    """Return a name for every freedom, in the order of `RobotModel.chain`: the joints', and theirs with the axis that a tilt turns about."""
-    names = []
-    for joint in robot.joints:
-        names.append(joint.name)
-        if tilts:
-            names += [f"{joint.name} about {_axis(tilt.axis)}" for tilt in joint.tilts]
-    return tuple(names)
-
-
-def _axis(axis: FloatArray) -> str:
-    along = int(np.argmax(np.abs(axis)))
-    return "xyz"[along] if abs(axis[along]) > 1.0 - 1e-9 else "({:.3g}, {:.3g}, {:.3g})".format(*axis)
 
 
 def answer(

@@ -315,16 +315,28 @@ class RobotModel(Shown):
             frozen(driven, np.intp),
         )
 
-    def sprung(self, stiffness: FloatArray, damping: FloatArray, tilts: bool = True) -> RobotModel:
-        """Return the robot with other springs and dampers, one for each freedom in the order of `chain`.
+    def spring_names(self, tilts: bool = True) -> tuple[str, ...]:
+        """Return what each freedom's spring is called, in the order of the chain: the joint's name, or that and across which axis."""
+        said = []
+        for joint in self.joints:
+            said.append(joint.name)
+            said += [f"{joint.name} about {_axis_name(tilt.axis)}" for tilt in (joint.tilts if tilts else ())]
+        return tuple(said)
+
+    def with_springs(self, stiffness: FloatArray, damping: FloatArray | None = None, tilts: bool = True) -> RobotModel:
+        """Return the robot with other springs of its freedoms, in the order of the chain.
 
         Parameters
         ----------
-        stiffness, damping : arrays, shape (n,) [N m/rad], [N m s/rad]
+        stiffness : array, shape (n,) [N m/rad]
+        damping : array, shape (n,) [N m s/rad], default as it is
         tilts : bool
             Whether those across the joints' axes are among them.
         """
-        springs = iter(zip(stiffness.tolist(), damping.tolist(), strict=True))
+        chain = self.chain(tilts)
+        springs = iter(
+            zip(*(np.asarray(each).tolist() for each in (stiffness, chain.damping if damping is None else damping)), strict=True)
+        )
 
         def with_next(each: _Spring) -> _Spring:
             k, d = next(springs)
@@ -372,6 +384,11 @@ def turned_within(angle: float, limits: tuple[float, float], near: float = 0.0) 
     turns = np.arange(-3, 4) * 2.0 * np.pi + np.arctan2(np.sin(angle), np.cos(angle))
     within = turns[(turns >= low) & (turns <= high)]
     return float(within[np.argmin(np.abs(within - near))]) if within.size else np.nan
+
+
+def _axis_name(axis: FloatArray) -> str:
+    along = np.flatnonzero(np.abs(axis) > 1.0 - _ROUNDED)
+    return "xyz"[along[0]] if along.size else ", ".join(f"{v:.3g}" for v in axis)
 
 
 def _unit(name: str, axis: FloatArray) -> FloatArray:

@@ -118,3 +118,15 @@ def test_whole_turns_bring_an_angle_within_limits():
     assert turned_within(np.radians(200.0), (0.0, 2.0 * np.pi)) == pytest.approx(np.radians(200.0))
     assert np.isnan(turned_within(np.radians(170.0), (-1.0, 1.0)))
     assert turned_within(np.radians(-160.0), np.radians((-270.0, 270.0)), np.radians(190.0)) == pytest.approx(np.radians(200.0))
+
+
+def test_springs_by_name_and_in_the_chains_order():
+    arm = robot("kr210")
+    names = arm.spring_names()
+    assert names[:4] == ("A1", "A1 about x", "A1 about y", "A2")
+    assert arm.spring_names(tilts=False) == ("A1", "A2", "A3", "A4", "A5", "A6")
+    softer = arm.with_springs(0.5 * arm.chain().stiffness)
+    np.testing.assert_array_equal(softer.chain().stiffness, 0.5 * arm.chain().stiffness)
+    drives = arm.with_springs(np.arange(1.0, 7.0), tilts=False)
+    np.testing.assert_array_equal(drives.chain(tilts=False).stiffness, np.arange(1.0, 7.0))
+    assert drives.joints[0].tilts == arm.joints[0].tilts

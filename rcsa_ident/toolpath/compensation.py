@@ -1,0 +1,72 @@
+"""Paths to command so that a machine that gives way under its process ends where it should [bauer2013].
+
+Two ways, of whatever machine: what it does is asked of functions. Ahead of the force, all freedoms are turned to where their springs answer
+with the torques of the ideal motion, and the place they come to is commanded. Mirrored, the deviation that a simulation or a measurement
+of the commanded path shows is taken off it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+
+Place = TypeVar("Place")
+
+
+def ahead_of_force(
+    angles: FloatArray, torques: FloatArray, twist: Callable[[FloatArray], FloatArray], place: Callable[[FloatArray], Place]
+) -> Sequence[Place]:
+    """Return the places to command along a path, q + K^-1 tau, play to the torque's side.
+
+    Parameters
+    ----------
+    angles : array, shape (k, n) [rad]
+        Of all freedoms on the ideal path, those included that no drive moves.
+    torques : array, shape (k, n) [N m]
+        That the springs must give there: of the motion, less those of the forces on the tool.
+    twist : callable
+        From torques (n,) that springs must give to how far they are turned for it (n,).
+    place : callable
+        From angles (n,) to what the machine is sent to.
+
+    Examples
+    --------
+    A rod of 1 m on a spring of 1e5 N m/rad that must give 100 N m:
+
+    >>> ahead_of_force(np.zeros((1, 1)), np.full((1, 1), 100.0), lambda t: t / 1e5, lambda q: float(q[0]))
+    [0.001]
+    """
+    if np.shape(angles) != np.shape(torques):
+        raise InputError("torques", np.shape(torques), f"{np.shape(angles)}, as the angles have")
+    return [place(each + twist(torque)) for each, torque in zip(angles, torques, strict=True)]
+
+
+def mirrored(places: FloatArray, reached: Callable[[FloatArray], FloatArray], passes: int = 1) -> FloatArray:
+    """Return the places to command, shape (k, 3) [m]: p - (p_reached - p), again from there as often as wanted.
+
+    Parameters
+    ----------
+    places : array, shape (k, 3) [m]
+        Where the tool should be.
+    reached : callable
+        From commanded places (k, 3) to where the tool is then, (k, 3).
+    passes : int
+
+    Examples
+    --------
+    A machine that gives way by a thousandth of where it is sent:
+
+    >>> mirrored(np.array([[1.0, 0.0, 0.0]]), lambda sent: 1.001 * sent).round(6).tolist()
+    [[0.999, 0.0, 0.0]]
+    """
+    if passes < 1:
+        raise InputError("passes", passes, "at least one")
+    commanded = np.asarray(places, dtype=float)
+    for _ in range(passes):
+        commanded = commanded - (reached(commanded) - places)
+    return commanded
