@@ -16,11 +16,12 @@ from rcsa_ident.identification.coupled._kernels import factorise, solve, solve_t
 class ArmArrays(NamedTuple):
     """An arm as the kernel reads it.
 
-    mass (c, n, n) at each posture; shapes (c, n, 6): what each freedom moves at the flange, t and r in X and in Y, along Z and about it;
-    stiffness, damping (n,).
+    mass (c, n, n) at each posture, the sum of G^T G over its bodies (c, b, 6, n); shapes (c, n, 6): what each freedom moves at the flange,
+    t and r in X and in Y, along Z and about it; stiffness, damping (n,).
     """
 
     mass: np.ndarray
+    bodies: np.ndarray
     shapes: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
@@ -75,11 +76,11 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
     of the flange - y, p = Z^-1 (T v + the row's share of the housing), q = Z^-1 T x:
     d line = v^T dB x + p^T (dT x - dZ q) + v^T dT^T q - y^T dK_joint^-1 x.
 
-    The gradient's columns: stiffness (n), damping (n), log omega_n (m), psi by rows (4 m), pull by rows (4 m), factor's lower triangle by
-    rows, residual's lower triangle by rows (10), joint (4).
+    The gradient's columns: stiffness (n), damping (n), logarithms of the bodies' masses (b), log omega_n (m), psi by rows (4 m), pull by
+    rows (4 m), factor's lower triangle by rows, residual's lower triangle by rows (10), joint (4).
     """
     omega_n, psi, pull, factor, residual, joint = spindle
-    n, m = arm.stiffness.size, omega_n.size
+    n, m, bodies = arm.stiffness.size, omega_n.size, arm.bodies.shape[1]
     linear = lines_x.gradient.shape[0] > 0 or lines_y.gradient.shape[0] > 0
     outputs = lines_x.parts.shape[1]
     damping = factor @ factor.T
@@ -97,6 +98,7 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
     y = column[:, 0]
     p, q = np.empty((2, n + m), dtype=np.complex128)
     lp, lq = np.empty((2, m), dtype=np.complex128)
+    swung = np.empty((bodies, 6), dtype=np.complex128)
     seen[n:, :4] = psi
     for f in range(points.omega.size):
         w, c = points.omega[f], points.posture[f]
@@ -141,6 +143,13 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
             for d in range(6):
                 total += right[i, d] * x[d]
             q[i] = total
+        if linear:
+            for k in range(bodies):
+                for d in range(6):
+                    total = complex(0.0, 0.0)
+                    for i in range(n):
+                        total += arm.bodies[c, k, d, i] * q[i]
+                    swung[k, d] = w * w * total
         for axis in range(2):
             place = points.place[f, axis]
             if place < 0:
@@ -197,6 +206,15 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
                         sum_v += residual[i, j] * v[i]
                     rx[j], rv[j] = sum_x, sum_v
                 k = 2 * n
+                for body in range(bodies):
+                    total = complex(0.0, 0.0)
+                    for d in range(6):
+                        own = complex(0.0, 0.0)
+                        for i in range(n):
+                            own += arm.bodies[c, body, d, i] * p[i]
+                        total += own * swung[body, d]
+                    row[k] = total
+                    k += 1
                 for i in range(m):
                     row[k] = -2.0 * omega_n[i] ** 2 * p[n + i] * q[n + i]
                     k += 1

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupled_data
 from rcsa_ident.identification.data import LEVER, IdentificationData
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
+from rcsa_ident.machine.robot.model import RobotModel
+from rcsa_ident.machine.robot.sensitivity import mass_slopes
 
 #: From SI to scaled units: slopes times the lever.
 SCALE = np.array([1.0, LEVER, 1.0, LEVER, 1.0, LEVER])
@@ -23,7 +26,7 @@ Rods = Callable[[int, FloatArray], tuple[ComplexArray, ComplexArray, ComplexArra
 Axial = Callable[[int, np.ndarray], tuple[ComplexArray, ComplexArray]]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class PosedData:
     """Points of a campaign on a robot: each is one tooth-passing line of one cut, in X, in Y or in both.
 
@@ -32,8 +35,8 @@ class PosedData:
     base : IdentificationData
     teeth : array of int, shape (t,)
         Of each tooling's cutter.
-    mass : array, shape (c, n, n) [kg m^2]
-        Of all freedoms at each posture.
+    bodies : array, shape (c, b, 6, n) [sqrt(kg) m]
+        G of each body at each posture: G^T G is what it adds to the mass matrix of all freedoms, as heavy as the data sheet has it.
     shapes : array, shape (c, n, 6)
         What each freedom moves where the tool-holder sits, in the spindle's axes: t, lever r in X and in Y, along Z, lever times turn.
     posture : array of int, shape (p,)
@@ -50,7 +53,7 @@ class PosedData:
 
     base: IdentificationData
     teeth: np.ndarray
-    mass: FloatArray
+    bodies: FloatArray
     shapes: FloatArray
     posture: np.ndarray
     omega: FloatArray
@@ -61,22 +64,32 @@ class PosedData:
     tip: ComplexArray
 
     @property
+    def masses(self) -> int:
+        """Number of bodies: links, and the payload."""
+        return self.bodies.shape[1]
+
+    @property
     def freedoms(self) -> int:
         """Of the arm."""
-        return self.mass.shape[1]
+        return self.bodies.shape[3]
+
+    @cached_property
+    def mass(self) -> FloatArray:
+        """What each body adds to the mass matrix at each posture, shape (c, b, n, n) [kg m^2]."""
+        return frozen(np.swapaxes(self.bodies, 2, 3) @ self.bodies)
 
     def below(self, omega: float) -> PosedData:
         """Return the points below a frequency [rad/s]."""
         return self._kept(self.omega < omega, [axis.omega < omega for axis in self.base.axes])
 
-    def up_to_harmonic(self, highest: int) -> PosedData:
-        """Return the points up to a multiple of the tooth-passing frequency."""
-        most = highest * self.teeth[self.base.cut_tooling]
-        orders = np.zeros(self.omega.size)
-        for i, axis in enumerate(self.base.axes):
+    def at_harmonics(self, wanted: Sequence[int]) -> PosedData:
+        """Return the points at some multiples of the tooth-passing frequency."""
+        lines = [np.isin(np.rint(axis.order / self.teeth[self.base.cut_tooling[axis.cut]]), wanted) for axis in self.base.axes]
+        points = np.zeros(self.omega.size, dtype=bool)
+        for i, kept in enumerate(lines):
             own = self.place[:, i] >= 0
-            orders[own] = (axis.order <= most[axis.cut])[self.place[own, i]]
-        return self._kept(orders > 0.0, [axis.order <= most[axis.cut] for axis in self.base.axes])
+            points[own] |= kept[self.place[own, i]]
+        return self._kept(points, lines)
 
     def _kept(self, points: np.ndarray, lines: list[np.ndarray]) -> PosedData:
         place = np.array(self.place[points])
@@ -141,13 +154,27 @@ def posed_data(
     return PosedData(
         plain.base,
         frozen([teeth[name] for name in data.toolings], np.intp),
-        frozen([s.mass for s in structures]),
+        frozen([roots_of_mass(robot, posture) for posture in postures]),
         frozen([s.ports * SCALE for s in structures]),
         frozen(of_cut[cut], np.intp),
         plain.omega,
         plain.place,
         *(frozen(each, np.complex128) for each in (force, slope, flange, tip)),
     )
+
+
+def roots_of_mass(robot: FlexibleRobot, posture: FloatArray) -> FloatArray:
+    """Return G of each link and of the payload, G^T G what it adds to the mass matrix at a posture, shape (b, 6, n) [sqrt(kg) m]."""
+    values, vectors = np.linalg.eigh(mass_slopes(robot.model, posture, robot.tilts))
+    # a body moves in six directions
+    most = np.sqrt(np.maximum(values[:, -6:], 0.0) * np.array(body_masses(robot.model))[:, None])
+    found: FloatArray = np.swapaxes(vectors[:, :, -6:] * most[:, None, :], 1, 2)
+    return found
+
+
+def body_masses(robot: RobotModel) -> tuple[float, ...]:
+    """Return the masses of the links, then of the payload where there is one [kg]."""
+    return (*(joint.body.mass for joint in robot.joints), *(() if robot.payload is None else (robot.payload.mass,)))
 
 
 def _cuts_and_orders(data: IdentificationData, points: CoupledData) -> tuple[np.ndarray, np.ndarray]:

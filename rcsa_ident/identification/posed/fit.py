@@ -18,8 +18,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.joint_fit import refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.model_order import Report, cut_weights, drop_modes, evidence, grow_modes, model_error
-from rcsa_ident.identification.parameters import JOINT, Unknowns
+from rcsa_ident.identification.model_order import Report, evidence, grow_modes
+from rcsa_ident.identification.parameters import Unknowns
 from rcsa_ident.identification.posed.data import PosedData
 from rcsa_ident.identification.posed.misfit import PosedMisfit
 from rcsa_ident.identification.posed.modes import POSED, layout_of
@@ -32,18 +32,18 @@ from rcsa_ident.units import from_hz
 
 #: Up to which frequency a spindle is as good as rigid, and the tops of the bands that follow [Hz].
 ARM_BAND = 120.0
-BANDS = (240.0, 480.0, 960.0, 1500.0, 2200.0, 3200.0)
-#: Harmonics of the tooth passing above which a simulated force is a matter of the edges' last micrometres.
-MOST_HARMONICS = 30
-#: Model errors of the arm's fit, from coarse to fine; from `GRID` on the cuts' delays are looked for over all of a tooth passing.
-SHARES, GRID = (1.0, 0.3, 0.1, 0.03, 0.01), 0.1
-#: Model error with which a band begins, and the least one that it learns on the way.
-FIRST_SHARE, LEAST_SHARE = 0.02, 0.002
+BANDS = (300.0, 700.0, 1200.0, 1800.0, 2500.0, 3300.0)
+#: Harmonics of the tooth passing that are used: a slow cut has two hundred, whose neighbours tell the same, and above the last of these a
+#: simulated force is a matter of the edges' last micrometres.
+HARMONICS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 15, 18, 22, 26, 30)
+#: Model errors of the arm's fit and of each band above, from coarse to fine; down to `GRID` the cuts' delays are looked for over all of a
+#: tooth passing: a fast cut's first line may be this band's.
+SHARES, BAND_SHARES, GRID = (1.0, 0.3, 0.1, 0.03, 0.01), (0.3, 0.1, 0.03), 0.1
 #: Starts of the arm's fit: the data sheet's springs, and draws of what is believed of them.
 STARTS = 8
 #: Gain in evidence for which a mode is taken in.
 WORTH = 5.0
-_STEPS, _ROUGHLY = 60, 1e-3
+_STEPS, _ROUGHLY, _WELL = 60, 1e-3, 1e-4
 #: Residual compliance's factor where it begins, in its unit.
 _FIRST_RESIDUAL = 0.5
 
@@ -69,7 +69,7 @@ class ArmStart:
     def run(self) -> Candidate:
         """Refine from coarse to fine."""
         theta, nuisance = self.theta, np.zeros((len(self.data.base.cut_ids), 2))
-        layout = PosedLayout(self.data.freedoms, 0, len(self.data.base.coefficient_spread))
+        layout = PosedLayout(self.priors.springs, self.data.masses, 0, len(self.data.base.coefficient_spread))
         for share in SHARES:
             misfit = PosedMisfit(self.data, self.priors, (share, share))
             found = refine(misfit, theta, layout, nuisance, _STEPS, grid=32 if share >= GRID else 0)
@@ -96,13 +96,10 @@ def fit_robot(data: PosedData, priors: ArmPriors, seed: int, map: Map, report: R
     InputError
         If no line is low enough to tell the arm.
     """
-    data = data.up_to_harmonic(MOST_HARMONICS)
+    data = data.at_harmonics(HARMONICS)
     summed = data.summed()
     found, misfit = _spindle(summed, priors, _arm(summed, priors, seed, map), report)
-    found, misfit = _with_all_outputs(data, priors, found, misfit, report)
-    dropped = drop_modes(found, misfit, report, smallest=0, give_up=2.0 * WORTH, steps=POSED)
-    if evidence(dropped, misfit) < evidence(found, misfit):
-        found = dropped
+    found, misfit = _learned(data, priors, _with_all_outputs(data, found), misfit.model_error, misfit.cut_weight, report, _WELL)
     rival = grow_modes(found, misfit, data.base.band_hz, POSED)
     report(Stage.GROW, rival.cost, rival)
     return found, misfit, rival
@@ -127,20 +124,20 @@ def _arm(data: PosedData, priors: ArmPriors, seed: int, map: Map) -> Candidate:
 
 
 def _spindle(data: PosedData, priors: ArmPriors, arm: Candidate, report: Report) -> tuple[Solution, PosedMisfit]:
-    """Band by band upwards, the noise learned and modes taken in within each."""
+    """Band by band upwards from coarse to fine, modes taken in at the end of each; then the noise is learned, and modes once more."""
     point, weight = arm.point, np.ones(len(data.base.cut_ids))
     for part in _bands(data):
-        shares = (FIRST_SHARE, FIRST_SHARE)
-        for _ in range(3):
-            misfit = PosedMisfit(part, priors, shares, weight)
-            found = refine(misfit, *point, _STEPS, tolerance=_ROUGHLY)
-            report(Stage.POLISH, found.cost, found)
-            found = _grown(found, misfit, part, report)
-            point, weight = found.candidate.point, cut_weights(found, misfit)
-            learned = tuple(float(np.clip(new, LEAST_SHARE, old)) for new, old in zip(model_error(found, misfit), shares, strict=True))
-            if all(abs(new / old - 1.0) < 0.2 for new, old in zip(learned, shares, strict=True)):
-                break
-            shares = learned
+        for share in BAND_SHARES:
+            misfit = PosedMisfit(part, priors, (share, share), weight)
+            found = refine(misfit, *point, _STEPS, grid=32 if share >= GRID else 0, tolerance=_ROUGHLY)
+            point = found.candidate.point
+        report(Stage.REFINE, found.cost, found)
+        point = _grown(found, misfit, part, report).candidate.point
+    shares = misfit.model_error
+    for _ in range(2):
+        found, misfit = _learned(data, priors, point, shares, weight, report, _ROUGHLY)
+        found = _grown(found, misfit, data, report)
+        point, shares, weight = found.candidate.point, misfit.model_error, misfit.cut_weight
     return found, misfit
 
 
@@ -167,21 +164,28 @@ def _grown(found: Solution, misfit: PosedMisfit, data: PosedData, report: Report
         report(Stage.GROW, found.cost, found)
 
 
-def _with_all_outputs(
-    data: PosedData, priors: ArmPriors, found: Solution, misfit: PosedMisfit, report: Report
+def _with_all_outputs(data: PosedData, found: Solution) -> tuple[FloatArray, Unknowns, FloatArray]:
+    """Where the fit to gap and fixture apart begins, the triggers' tooth angles among the unknowns."""
+    layout, nuisance = layout_of(found.layout), found.evaluation.nuisance
+    angles, nuisance = tooth_angles(data.base, nuisance) if data.base.clampings else (np.zeros(0), nuisance)
+    theta = np.concatenate([found.theta[: layout.force.stop], angles])
+    return theta, replace(layout, clampings=angles.size), nuisance
+
+
+def _learned(
+    data: PosedData,
+    priors: ArmPriors,
+    start: tuple[FloatArray, Unknowns, FloatArray],
+    shares: tuple[float, ...],
+    weight: FloatArray,
+    report: Report,
+    tolerance: float,
 ) -> tuple[Solution, PosedMisfit]:
-    """The same with gap and fixture apart and the triggers' tooth angles among the unknowns, polished until the noise stays."""
+    """Polish and learn the noise in turns until it stays."""
 
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> PosedMisfit:
         return PosedMisfit(data, priors, shares, weight)
 
-    layout, nuisance = layout_of(found.layout), found.evaluation.nuisance
-    angles, nuisance = tooth_angles(data.base, nuisance) if data.base.clampings else (np.zeros(0), nuisance)
-    start: tuple[FloatArray, Unknowns, FloatArray] = (
-        np.concatenate([found.theta[: layout.tail + JOINT + layout.coefficients], angles]),
-        replace(layout, clampings=angles.size),
-        nuisance,
-    )
-    polished, last = refine_and_learn_noise(misfit_of, start, misfit.model_error, misfit.cut_weight, report, 1e-4)
-    assert isinstance(last, PosedMisfit)
-    return polished, last
+    polished, misfit = refine_and_learn_noise(misfit_of, start, shares, weight, report, tolerance)
+    assert isinstance(misfit, PosedMisfit)
+    return polished, misfit

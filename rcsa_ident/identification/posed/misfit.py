@@ -56,12 +56,12 @@ class PosedMisfit(Misfit):
         lines = [_lines(axis, layout, normal) for axis in self._axes]
         spindle, joint = robot.spindle, scaled_joint(theta[layout.joint])
         posed_lines(
-            ArmArrays(data.mass, data.shapes, robot.stiffness, robot.damping),
+            ArmArrays(np.einsum("b,cbij->cij", robot.heavier, data.mass), data.bodies, data.shapes, robot.stiffness, robot.damping),
             SpindleArrays(spindle.omega_n, spindle.psi, spindle.pull, spindle.factor, spindle.residual, joint),
             PointArrays(data.omega, data.posture, data.place, data.flange, data.tip, force),
             *lines,
         )
-        scale, answers = np.concatenate([chain(robot), joint]), []
+        scale, answers = np.concatenate([chain(robot, theta, layout), joint]), []
         for i, (axis, found) in enumerate(zip(self.data.axes, lines, strict=True)):
             seen = np.flatnonzero(data.place[:, i] >= 0)
             at = np.empty(seen.size, dtype=np.intp)

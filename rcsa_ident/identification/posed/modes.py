@@ -54,4 +54,4 @@ def _spindle(solution: Solution) -> SpindleParameters:
 def _with(solution: Solution, spindle: SpindleParameters) -> Trial:
     old = layout_of(solution.layout)
     robot = replace(unpack(solution.theta, old), spindle=spindle)
-    return np.concatenate([pack(robot), solution.theta[old.tail :]]), replace(old, modes=spindle.order)
+    return np.concatenate([pack(robot, old), solution.theta[old.tail :]]), replace(old, modes=spindle.order)

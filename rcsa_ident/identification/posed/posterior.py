@@ -55,9 +55,9 @@ class RobotUnknowns:
         return CarriedSpindle(own.omega_n, own.factor @ own.factor.T, own.psi * _SI, own.pull / _SI, residual)
 
     def arm(self, sheet: RobotModel, tilts: bool) -> FlexibleRobot:
-        """Return the arm of a data sheet with these springs and dampers."""
+        """Return the arm of a data sheet with these springs, dampers and masses."""
         found = unpack(self.theta, self.layout)
-        return FlexibleRobot(sheet.with_springs(found.stiffness, found.damping, tilts), tilts)
+        return FlexibleRobot(sheet.with_springs(found.stiffness, found.damping, tilts).heavier(found.heavier), tilts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,14 +9,16 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.identification.parameters import DAMPING_UNIT, lower_triangle
-from rcsa_ident.identification.posed.parameters import PosedLayout
+from rcsa_ident.identification.posed.parameters import PosedLayout, unknown_of
 from rcsa_ident.identification.priors import PriorRows, Priors
 from rcsa_ident.machine.robot.model import RobotModel
 
-#: Standard deviations of the logarithms of a drive's stiffness, of that across a joint's axis, and of a damper.
-DRIVE, TILT, DAMPER = 0.5, 0.7, 1.0
+#: Standard deviations of a drive's compliance over the data sheet's, of that across a joint's axis, and of a damper's logarithm.
+DRIVE, TILT, DAMPER = 0.6, 0.8, 1.0
 #: Spread of what the housing's motion pulls a mode of the spindle with [sqrt(kg)]: a shaft of some kilograms.
 PULL = 2.0
+#: Standard deviations of the logarithms of a link's mass and of the payload's, which somebody has weighed.
+MASS, PAYLOAD = 0.05, 0.02
 #: Damping over the root of the stiffness [sqrt(N m) s] where a data sheet has none: that of the arm of [huynh2020].
 _USUAL_DAMPING = 0.269
 
@@ -27,13 +29,16 @@ class ArmPriors:
 
     Parameters
     ----------
-    centre, spread : arrays, shape (2 n,)
-        Of the logarithms of stiffness [N m/rad] and damping [N m s/rad].
+    centre, spread : arrays, shape (2 n + b,)
+        Of the compliances' unknowns, of the logarithms of damping [N m s/rad] and of the bodies' masses over those of the data sheet.
+    springs : tuple of float, length n [N m/rad]
+        The data sheet's.
     spindle : Priors
     """
 
     centre: FloatArray
     spread: FloatArray
+    springs: tuple[float, ...]
     spindle: Priors = field(default_factory=Priors)
 
 
@@ -43,8 +48,11 @@ def arm_priors(robot: RobotModel, tilts: bool = True) -> ArmPriors:
     damping = np.where(chain.damping > 0.0, chain.damping, _USUAL_DAMPING * np.sqrt(chain.stiffness))
     stiff = np.full(chain.stiffness.size, TILT)
     stiff[chain.driven] = DRIVE
-    centre = np.log(np.concatenate([chain.stiffness, damping]))
-    return ArmPriors(frozen(centre), frozen(np.concatenate([stiff, np.full(stiff.size, DAMPER)])))
+    heavier = np.array([MASS] * len(robot.joints) + [PAYLOAD] * (robot.payload is not None))
+    as_told = np.full(stiff.size, float(unknown_of(np.array(1.0))))
+    centre = np.concatenate([as_told, np.log(damping), np.zeros(heavier.size)])
+    spread = np.concatenate([stiff, np.full(stiff.size, DAMPER), heavier])
+    return ArmPriors(frozen(centre), frozen(spread), tuple(chain.stiffness.tolist()))
 
 
 @lru_cache(maxsize=64)
@@ -61,7 +69,7 @@ def posed_prior_rows(layout: PosedLayout, priors: ArmPriors, coefficients: tuple
     known, m = priors.spindle, layout.modes
     diagonal = lower_triangle(m)[2]
     centre, spread = np.zeros(layout.size), np.empty(layout.size)
-    arm = slice(0, 2 * layout.freedoms)
+    arm = slice(0, layout.weights.stop)
     centre[arm], spread[arm] = priors.centre, priors.spread
     centre[layout.frequencies], spread[layout.frequencies] = np.log(2.0 * np.pi * known.frequency_hz), known.frequency_spread
     spread[layout.shapes], spread[layout.pulls] = known.shape, PULL

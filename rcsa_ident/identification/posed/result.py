@@ -13,6 +13,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.posed.misfit import PosedMisfit
 from rcsa_ident.identification.posed.modes import layout_of
+from rcsa_ident.identification.posed.parameters import stiffening, unpack
 from rcsa_ident.identification.posed.posterior import RobotPosterior, RobotUnknowns
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.robot.model import RobotModel
@@ -73,12 +74,12 @@ class RobotIdentification(Shown):
     def springs(self) -> tuple[tuple[str, float, float, bool], ...]:
         """Name, stiffness [N m/rad], its deviation as a share, and whether the cuts tell it, of every freedom."""
         posterior = self.posterior
-        spread = np.sqrt(np.diag(posterior.covariance))[posterior.best.layout.stiffness]
-        stiffness = np.exp(posterior.best.theta[posterior.best.layout.stiffness])
+        best, own = posterior.best, posterior.best.layout.compliances
+        spread, stiffness = np.sqrt(np.diag(posterior.covariance))[own], unpack(best.theta, best.layout).stiffness
+        told = spread < TOLD * posterior.believed[own]
+        share = spread * np.abs(stiffening(best.theta, best.layout))
         names = posterior.sheet.spring_names(posterior.tilts)
-        believed = posterior.believed[posterior.best.layout.stiffness]
-        told = spread < TOLD * believed
-        return tuple(zip(names, stiffness.tolist(), spread.tolist(), told.tolist(), strict=True))
+        return tuple(zip(names, stiffness.tolist(), share.tolist(), told.tolist(), strict=True))
 
     def __str__(self) -> str:
         best = self.posterior.best.layout
@@ -109,7 +110,7 @@ def answer(
     own = layout.machine
     prior = misfit.prior(layout).spread
     best, other = (_unknowns(each) for each in (found, rival))
-    posterior = RobotPosterior(sheet, tilts, best, 0.5 * (covariance + covariance.T)[np.ix_(own, own)], prior[own], (other,))
+    posterior = RobotPosterior(sheet, tilts, best, 0.5 * (covariance + covariance.T)[own, own], prior[own], (other,))
     chi2 = sum(found.evaluation.chi2) / misfit.points
     result = RobotIdentification(Status.CONVERGED, (), (), seed, posterior, misfit.model_error, chi2, data.cut_ids, postures, data.band_hz)
     reasons = _reasons(result, found, misfit)

@@ -87,6 +87,10 @@ class Body:
         if self.inertia.shape != (3, 3) or not np.all(np.isfinite(self.inertia)) or not np.allclose(self.inertia, self.inertia.T):
             raise InputError("inertia", self.inertia.tolist(), "a symmetric tensor, shape (3, 3) [kg m^2]")
 
+    def times(self, factor: float) -> Body:
+        """Return a body of the same shape, so many times as heavy."""
+        return Body(factor * self.mass, self.centre, factor * self.inertia)
+
     def seen_from(self, frame: Frame) -> Body:
         """Return the body in the axes that its own frame is seen from."""
         return Body(self.mass, frame.point(self.centre), frame.turn @ self.inertia @ frame.turn.T)
@@ -347,6 +351,12 @@ class RobotModel(Shown):
             turning = with_next(joint)
             joints.append(replace(turning, tilts=tuple(with_next(tilt) for tilt in joint.tilts)) if tilts else turning)
         return replace(self, joints=tuple(joints))
+
+    def heavier(self, factors: FloatArray) -> RobotModel:
+        """Return the robot with so many times the mass, and the inertia, of each link, and last of the payload where there is one."""
+        values = np.asarray(factors, dtype=float).tolist()
+        joints = tuple(replace(joint, body=joint.body.times(k)) for joint, k in zip(self.joints, values, strict=False))
+        return replace(self, joints=joints, payload=None if self.payload is None else self.payload.times(values[-1]))
 
     def posture(self, angles: FloatArray) -> FloatArray:
         """Return a posture as an array, shape (j,) [rad].
