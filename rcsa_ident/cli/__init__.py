@@ -32,6 +32,7 @@ from rcsa_ident.cli import (  # noqa: E402
     ring,
     robot,
     robot_draw,
+    robot_import,
     schema,
     tap,
     tools,
@@ -91,7 +92,7 @@ _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
 for _title, _commands in _COMMANDS.items():
     for _command in _commands:
         app.command(_command.__name__.replace("_", "-"), cls=_Literal, rich_help_panel=_title)(_command)
-for _name, _command in (robot.COMMANDS | robot_draw.COMMANDS).items():
+for _name, _command in (robot.COMMANDS | robot_draw.COMMANDS | robot_import.COMMANDS).items():
     robot.robot_app.command(_name, cls=_Literal)(_command)
 app.add_typer(robot.robot_app, name="robot", rich_help_panel="Milling robots")
 
