@@ -67,10 +67,15 @@ def _carried(packed: str, folder: str, member: str) -> Path:
 
 def sample_robot(name: str) -> RobotModel:
     """Return a published arm: ``tx200``, ``kr210`` or ``kr500``, which has no masses."""
-    known = {path.stem: path for path in sorted(_carried("sample_robots", "robots", "tx200.toml").glob("*.toml"))}
+    known = sample_robots()
     if name not in known:
         raise InputError("robot", name, f"one of {', '.join(known)}")
     return read_robot(known[name])
+
+
+def sample_robots() -> dict[str, Path]:
+    """Return the files of the published arms by their names."""
+    return {path.stem: path for path in sorted(_carried("sample_robots", "robots", "tx200.toml").glob("*.toml"))}
 
 
 def sample_toolings() -> dict[str, Path]:
