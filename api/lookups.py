@@ -23,6 +23,7 @@ from api.work.forces import ReadPair
 from api.work.requests import MachineText, ToolingSource
 from api.work.robots import parsed, posed_text
 from rcsa_ident.errors import InputError
+from rcsa_ident.samples import sample_robots
 from rcsa_ident.signals.recording import Sensor
 
 
@@ -46,11 +47,13 @@ def identification_of(components: Components, group: str, id: str) -> Document:
 
 
 def posed_robot(components: Components, group: str, asked: Posed) -> MachineText:
-    """Return a robot at a posture, one that is kept or as it came."""
+    """Return a robot at a posture: one that is kept, else a published one, or as it came."""
     if isinstance(asked.robot, RobotKeys):
         keys = asked.robot.model_dump(exclude_unset=True, exclude_none=True)
+    elif (kept := components.store.robots.get(group, asked.robot)) is not None:
+        keys = parsed(kept.text)
     else:
-        keys = parsed(found_or_404(components.store.robots.get(group, asked.robot), f"robot {asked.robot}").text)
+        keys = parsed(found_or_404(sample_robots().get(asked.robot), f"robot {asked.robot}").read_text(encoding="utf-8"))
     text = posed_text(keys, asked.posture_deg, asked.joints_only)
     return MachineText(digest_of(text), text)
 

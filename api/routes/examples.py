@@ -33,7 +33,7 @@ _ABOUT = {
 }
 _ROBOTS = {
     "tx200.toml": "A robot: Stäubli TX200, angles of its encoders, all zero upright.",
-    "kr210.toml": "A robot: KUKA KR210 with a spindle, angles of the model.",
+    "kr210.toml": "A robot: KUKA KR210, with a spindle; angles of the model.",
     "kr500.toml": "A robot: KUKA KR500 R2830, postures and stiffness alone.",
 }
 SAMPLE, _SAMPLE_ABOUT = "sample-campaign.zip", "A campaign with two toolings: enough for an identification."
