@@ -117,6 +117,8 @@ class RobotSummary(Answer):
 class Posed(Body):
     """A robot whose drives hold a posture."""
 
-    robot: Annotated[Name | RobotKeys, Field(description="Name of one that is kept, else of a published one (tx200, kr210, kr500), or the robot itself.")]
+    robot: Annotated[
+        Name | RobotKeys, Field(description="Name of one that is kept, else of a published one (tx200, kr210, kr500), or the robot itself.")
+    ]
     posture_deg: list[Angle] = Field(min_length=1, max_length=MOST_JOINTS, description="Angles of the joints, as ROBOT.toml counts them.")
     joints_only: bool = Field(False, description="Leave the springs across the joints' axes out.")

@@ -22,8 +22,8 @@ from rcsa_ident.report.robot_view import arm_geometry
 from rcsa_ident.units import to_hz, to_rpm
 from rcsa_ident.workflows.robot_postures import at_posture, following, limits_along
 
-#: Largest text of a robot, joints of one, and springs across the axis of each.
-LARGEST, MOST_JOINTS, MOST_TILTS = 100_000, 12, 4
+#: Largest text of a robot, joints of one, and springs across the axis of each: more axes than three turn nothing.
+LARGEST, MOST_JOINTS, MOST_TILTS = 100_000, 12, 2
 #: Places of a path, and limits of a map.
 MOST_PLACES, MOST_LIMITS = 1000, 50_000
 #: A robot at a posture as text begins so: RESULT.json has no such key.

@@ -244,17 +244,23 @@ def test_keys_guard_robots_and_groups_see_their_own(guarded_http):
         return http.request(method, f"/v1{path}", headers={"X-API-Key": keys[key], **further.pop("headers", {})}, **further).status_code
 
     toml = {"content": TEXT.encode(), "headers": {"Content-Type": "application/toml"}}
-    assert send("PUT", "/robots/tx200", "read", **toml) == 403
-    assert send("PUT", "/robots/tx200", "upload", **toml) == 201
-    assert send("GET", "/robots/tx200", "read") == 200
-    body = {"robot": {"robot": "tx200", "posture_deg": POSTURE}}
+    assert send("PUT", "/robots/cell", "read", **toml) == 403
+    assert send("PUT", "/robots/cell", "upload", **toml) == 201
+    assert send("GET", "/robots/cell", "read") == 200
+    body = {"robot": {"robot": "cell", "posture_deg": POSTURE}}
     assert send("POST", "/robots/posture", "read", json=body) == 403
     assert send("POST", "/robots/posture", "run", json=body) == 200
-    assert send("GET", "/robots/tx200", "other") == 404
+    assert send("GET", "/robots/cell", "other") == 404
     assert send("POST", "/robots/posture", "other", json=body) == 404
 
 
-def test_published_robots_are_examples(client, tmp_path):
+def test_published_robots_are_examples_and_stand_in_queries(client, tmp_path):
+    published = client.posture({"robot": "tx200", "posture_deg": POSTURE})
+    assert published.name == "Stäubli TX200"
+    # one that is kept under that name comes before it
+    client.write_robot("tx200", TEXT.replace("Stäubli TX200", "our own"))
+    assert client.posture({"robot": "tx200", "posture_deg": POSTURE}).name == "our own"
+    client.forget_robot("tx200")
     listed = {each.name: each for each in client.examples()}
     for name in ("tx200.toml", "kr210.toml", "kr500.toml"):
         assert listed[name].about.startswith("A robot")
