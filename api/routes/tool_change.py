@@ -71,7 +71,9 @@ async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: W
     text = asked(machine, toolings, body.request(most))
     words = body.model_dump_json()
     watched = now() if "while-watched" in wanted else None
-    job = Job(new_id(), caller.group, LOBES, called, None, words, "queued", now(), key=caller.id, who=caller.name, watched=watched)
+    job = Job(
+        new_id(), caller.group, LOBES, body.machine or "", None, words, "queued", now(), key=caller.id, who=caller.name, watched=watched
+    )
     digest = hashlib.sha256(words.encode()).hexdigest()
     again = None if repeat is None else (repeat, digest)
     kept = await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again)
