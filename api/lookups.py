@@ -23,7 +23,7 @@ from api.work.forces import ReadPair
 from api.work.requests import MachineText, ToolingSource
 from api.work.robots import parsed, posed_text
 from rcsa_ident.errors import InputError
-from rcsa_ident.samples import sample_robots
+from rcsa_ident.sample_files import sample_robots
 from rcsa_ident.signals.recording import Sensor
 
 
