@@ -184,6 +184,9 @@ def _route(start: FloatArray, leaving: FloatArray, end: FloatArray, arriving: Fl
     """A line from a joint to the next along both axes and their common normal, shape (k, 3)."""
     gap = end - start
     straight = float(np.linalg.norm(gap))
+    if straight == 0.0:
+        # axes that cross in one point
+        return np.array([start, end])
     along = float(leaving @ arriving)
     if abs(along) > 1.0 - 1e-9:
         # parallel axes: the whole distance along them at once

@@ -114,6 +114,16 @@ def test_a_link_between_axes_that_hardly_differ_is_drawn_straight():
     assert reach_of(arm) == pytest.approx(0.3 + 0.5 * np.sqrt(2.0))
 
 
+def test_arms_of_few_joints_and_of_axes_that_cross_are_drawn():
+    z, y, body = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), robot("tx200").joints[0].body
+    one = RobotModel("one", (Joint("A", Frame(), z, body, 1e6),))
+    two = RobotModel("two", (*one.joints, Joint("B", Frame(), y, body, 1e6)), Frame(offset=0.5 * z))
+    for arm in (one, two):
+        svg = arm_svg(arm, np.full(len(arm.joints), 0.3), tool())
+        assert words_of(svg)[0] == arm.name
+        assert "nan" not in svg
+
+
 def words_of(svg):
     return [each.text for each in ElementTree.fromstring(svg).iter(f"{SVG}text")]
 
