@@ -15,12 +15,15 @@ from api.problems import Problem
 from api.reading.campaign_text import campaign_of_text
 from api.reading.reader_tasks import recording_and_air
 from api.reading.stored import found_of, samples_of
+from api.schemas.robots import Posed, RobotKeys
 from api.schemas.toolings import ToolingKeys
 from api.stores.campaigns import Campaign, Recording
-from api.stores.entities import Document, Machine, summary_of
+from api.stores.entities import Document, Machine, digest_of, summary_of
 from api.work.forces import ReadPair
 from api.work.requests import MachineText, ToolingSource
+from api.work.robots import parsed, posed_text
 from rcsa_ident.errors import InputError
+from rcsa_ident.sample_files import sample_robots
 from rcsa_ident.signals.recording import Sensor
 
 
@@ -41,6 +44,29 @@ def identification_of(components: Components, group: str, id: str) -> Document:
     """Return the identification of a machine, as it was written."""
     machine_of(components, group, id)
     return found_or_404(components.store.identifications.get(group, id), "identification of the machine")
+
+
+def posed_robot(components: Components, group: str, asked: Posed) -> MachineText:
+    """Return a robot at a posture: one that is kept, else a published one, or as it came."""
+    if isinstance(asked.robot, RobotKeys):
+        keys = asked.robot.model_dump(exclude_unset=True, exclude_none=True)
+    elif (kept := components.store.robots.get(group, asked.robot)) is not None:
+        keys = parsed(kept.text)
+    else:
+        keys = parsed(found_or_404(sample_robots().get(asked.robot), f"robot {asked.robot}").read_text(encoding="utf-8"))
+    text = posed_text(keys, asked.posture_deg, asked.joints_only)
+    return MachineText(digest_of(text), text)
+
+
+def tip_source(components: Components, group: str, machine: str | None, robot: Posed | None) -> tuple[MachineText, str]:
+    """Return what a tooling is asked on, a machine or a robot at a posture, and what the answer calls it."""
+    if (machine is None) == (robot is None):
+        raise InputError("machine", "nothing" if machine is None else "given beside robot", "a machine, or a robot at a posture")
+    if robot is not None:
+        name = robot.robot if isinstance(robot.robot, str) else robot.robot.robot.name
+        return posed_robot(components, group, robot), name
+    assert machine is not None
+    return known_machine(components, group, machine), machine
 
 
 def tooling_source(components: Components, group: str, tooling: str | ToolingKeys, number: int = 1) -> ToolingSource:

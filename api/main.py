@@ -42,6 +42,7 @@ from api.routes import (
     recordings,
     resumable_upload,
     ringing,
+    robots,
     schemas,
     static_files,
     streams,
@@ -138,7 +139,21 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, usage, machines, toolings, versions, libraries, dropped_files, holders, materials, schemas, examples, example_campaign)
+    about = (
+        keys,
+        usage,
+        machines,
+        toolings,
+        robots,
+        versions,
+        libraries,
+        dropped_files,
+        holders,
+        materials,
+        schemas,
+        examples,
+        example_campaign,
+    )
     taken = (listening, ringing, campaigns, recordings, learning, resumable_upload, tus, multi_upload)
     for each in (*about, *taken, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)

@@ -29,6 +29,7 @@ CLAIMS = (
     "published_modes",
     "bad_input",
     "robot",
+    "urdf",
 )
 #: Each is a module with ``main(arguments)``.
 STUDIES = (

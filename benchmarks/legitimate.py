@@ -23,7 +23,9 @@ import tomli_w
 from api.client import Client
 from api.routes.ringing import MOST_SOUNDS
 from api.schemas.queries import MOST_SPEEDS, MOST_TESTED, MOST_TOOLINGS
+from api.schemas.robots import EXAMPLE
 from api.schemas.toolings import MOST_SEGMENTS
+from api.work.robots import MOST_JOINTS, MOST_PLACES
 from api.work.tasks import MOST_LINES
 from benchmarks.hostile import Cost, cost_of
 from benchmarks.service import ask, machine_text, new_tooling, serving
@@ -39,7 +41,7 @@ _FORM = {"Content-Type": "multipart/form-data; boundary=x"}
 _PAGE = 200
 #: Routes that cost less are counted alone [s].
 SLIGHT = 0.05
-_LISTS = ("machines", "toolings", "changes", "recordings", "campaigns", "identifications", "keys")
+_LISTS = ("machines", "toolings", "robots", "changes", "recordings", "campaigns", "identifications", "keys")
 #: Segments of tool and of holder in what is computed: two elements each, and 400 may be computed with.
 _COMPUTED = 95
 #: Cuts of a campaign whose tooling is new to the machine: one or three are enough.
@@ -119,6 +121,7 @@ def _shop(port: int, folder: Path) -> Shop:
         for k in range(_PAGE):
             client.make_machine(f"machine {k}")
             client.write_tooling(f"T{k}", _full(k))
+            client.write_robot(f"T{k}", EXAMPLE)
         machine = client.make_machine("identified").id
         client.identify(machine, machine_text())
         client.write_tooling("T0", new_tooling(0))
@@ -186,7 +189,7 @@ def _ladders(method: str, path: str, shop: Shop) -> Iterator[Iterator[Ask]]:
     ids = {"/machines/": shop.machine, "/identifications/": shop.job, "/lobes/": shop.lobes, "/keys/": shop.key}
     id = next((found for part, found in ids.items() if part in path), shop.campaign)
     place = path.replace("{id}", id).replace("{version}", "1")
-    place = place.replace("{name}", "tooling" if "/schemas/" in path else "T0" if "/toolings/" in path else CUT)
+    place = place.replace("{name}", "tooling" if "/schemas/" in path else "T0" if "/toolings/" in path or "/robots/" in path else CUT)
     listed = method == "GET" and path.rpartition("/")[2] in _LISTS
     yield iter([Ask(f"a page of {_PAGE}" if listed else "", f"{place}?limit={_PAGE}" if listed else place, {}, b"")])
 
@@ -303,6 +306,38 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
         "POST /tooltip": [_halved("{} lines", MOST_LINES, lines("/v1/tooltip", machine=shop.machine, tooling=_full(0, _COMPUTED)))],
         "POST /lobes": several("/v1/lobes", 320),
         "POST /advice": several("/v1/advice", 160),
+        **_of_robots(),
+    }
+
+
+def _of_robots() -> dict[str, list[Iterator[Ask]]]:
+    """Questions of an arm: 12 joints with two springs across each, and a thousand places of the TX200."""
+    link = {"mass_kg": 50.0, "inertia_kg_m2": [2.0, 2.0, 2.0, 0.0, 0.0, 0.0]}
+    spring = {"stiffness_nm_per_rad": 1e6, "damping_nms_per_rad": 100.0}
+    tilts = [{"axis": axis, **spring} for axis in ([1.0, 0.0, 0.0], [0.0, 0.8, -0.6])]
+    joint = {"axis": [0.0, 0.6, 0.8], "offset_mm": [0.0, 100.0, 200.0], "link": link, "tilts": tilts, **spring}
+    arm = {"robot": {"name": "long"}, "joints": [joint | {"name": f"J{k}"} for k in range(MOST_JOINTS)]}
+    near = {"robot": "tx200", "posture_deg": [-11.71, 20.78, 110.0, 82.76, 60.80, -166.96]}
+
+    def along(path: str, **further: Any) -> Callable[[int], tuple[str, Any]]:
+        return lambda count: (
+            path,
+            {"robot": near, "tooling": new_tooling(0), "places": [[1000.0, 0.1 * k, 500.0] for k in range(count)], **further},
+        )
+
+    cut = {"ktc_mpa": 660.0, "krc": 0.38}
+    speeds = {"from_rpm": 4000.0, "to_rpm": 20_000.0, "step_rpm": 1000.0}
+    csv = "x_mm,y_mm,z_mm\n" + "1000,0,500\n" * MOST_PLACES
+    posture = {"robot": {"robot": arm, "posture_deg": [10.0] * MOST_JOINTS}}
+    size = f"{MOST_JOINTS} joints of {1 + len(tilts)} springs"
+    return {
+        "PUT /robots/{name}": [iter([Ask(size, "/v1/robots/T0", _JSON, json.dumps(arm).encode())])],
+        "POST /robots/posture": [iter([Ask(size, "/v1/robots/posture", _JSON, json.dumps(posture).encode())])],
+        "POST /robots/path": [_halved("{} places", MOST_PLACES, along("/v1/robots/path"))],
+        "POST /robots/map": [_halved("{} places, 17 speeds", MOST_PLACES, along("/v1/robots/map", cut=cut, speeds=speeds))],
+        "POST /robots/path/preview": [
+            iter([Ask(f"{MOST_PLACES} places", "/v1/robots/path/preview", {"Content-Type": "text/csv"}, csv.encode())])
+        ],
     }
 
 

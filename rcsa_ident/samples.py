@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from rcsa_ident.io.setups import CAMPAIGN_FILE, read_tooling
 from rcsa_ident.io.simulations import Progress, SimulatedCampaign, write_simulation
 from rcsa_ident.machine.robot.model import RobotModel
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.sample_files import sample_data, sample_robots
 from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances, truth_speeds
 
 #: Cuts of a sample campaign that is made on the spot: three in ten of those in the repository's, and a good answer all the same.
@@ -51,23 +51,9 @@ def simulate_campaign(
     return write_simulation(out, setup, toolings, cuts, truths, true_flange(setup), progress)
 
 
-def sample_data() -> Path:
-    """Return the folder of the virtual machines: inside an installed package, or the repository's ``data/machines``."""
-    return _carried("sample_data", "machines", "hpm.toml")
-
-
-def _carried(packed: str, folder: str, member: str) -> Path:
-    """Return where the package has a folder of the repository's data, known by one of its files."""
-    package = Path(str(files("rcsa_ident")))
-    for found in (package / packed, package.parent / "data" / folder):
-        if (found / member).is_file():
-            return found
-    raise InputError("sample data", "none beside the package", "an installed package, or a checkout of its repository", str(package))
-
-
 def sample_robot(name: str) -> RobotModel:
     """Return a published arm: ``tx200``, ``kr210`` or ``kr500``, which has no masses."""
-    known = {path.stem: path for path in sorted(_carried("sample_robots", "robots", "tx200.toml").glob("*.toml"))}
+    known = sample_robots()
     if name not in known:
         raise InputError("robot", name, f"one of {', '.join(known)}")
     return read_robot(known[name])

@@ -93,3 +93,8 @@ def match(seen: str | None) -> dict[str, str]:
 def read(model: type[Model], answer: httpx2.Response) -> Model:
     """Return an answer as a model."""
     return model.model_validate_json(answer.content)
+
+
+def standing_on(machine: str | Json) -> dict[str, Any]:
+    """Return the key of a query that says what a tooling stands on: a machine by its id, or a robot at a posture."""
+    return {"machine": machine} if isinstance(machine, str) else {"robot": machine}

@@ -10,7 +10,7 @@ from typing import Any
 
 import httpx2
 
-from api.client.asking import Asking, Json, ServiceError, read, refused
+from api.client.asking import Asking, Json, ServiceError, read, refused, standing_on
 from api.schemas.common import Page, ProblemDocument
 from api.schemas.jobs import FittedLines, JobAnswer, LobeJob
 from api.schemas.machines import Modes
@@ -92,9 +92,9 @@ class Jobs(Asking):
         """Return the report on an identification, HTML."""
         return self.send("GET", f"/identifications/{id}/report").text
 
-    def lobes(self, machine: str, *toolings: str | Json, **further: Any) -> LobeAnswer:
+    def lobes(self, machine: str | Json, *toolings: str | Json, **further: Any) -> LobeAnswer:
         """Return stability lobes of one or more toolings, also where the service turns the query into a job."""
-        answer = self.send("POST", "/lobes", json={"machine": machine, "toolings": list(toolings), **further})
+        answer = self.send("POST", "/lobes", json={**standing_on(machine), "toolings": list(toolings), **further})
         if answer.status_code == 200:
             return read(LobeAnswer, answer)
         id = read(JobAnswer, answer).id
@@ -107,9 +107,9 @@ class Jobs(Asking):
             raise ServiceError(422, ProblemDocument.model_validate(document))
         return found.answer
 
-    def lobes_later(self, machine: str, *toolings: str | Json, **further: Any) -> JobAnswer:
+    def lobes_later(self, machine: str | Json, *toolings: str | Json, **further: Any) -> JobAnswer:
         """Submit stability lobes as a job."""
-        body = {"machine": machine, "toolings": list(toolings), **further}
+        body = {**standing_on(machine), "toolings": list(toolings), **further}
         return read(JobAnswer, self.send("POST", "/lobes", json=body, headers={"Prefer": "respond-async"}))
 
     def lobe_job(self, id: str, wait: int = 0) -> LobeJob:

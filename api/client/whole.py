@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import httpx2
 
-from api.client.asking import Json, match, read
+from api.client.asking import Json, match, read, standing_on
 from api.client.jobs import Jobs
 from api.client.uploads import Uploads
 from api.schemas.common import Page
@@ -26,6 +26,8 @@ from api.schemas.machines import Frf, Identification, IdentificationSummary, Mac
 from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
 from api.schemas.ringing import RingAnswer
+from api.schemas.robot_queries import MapAnswer, PathAnswer, PathPreview, PostureAnswer
+from api.schemas.robots import RobotAnswer, RobotSummary
 from api.schemas.toolings import ToolingAnswer, ToolingSummary
 from api.schemas.usage import Usage
 from api.schemas.versions import ChangeAnswer, Differences, ToolingVersion
@@ -79,13 +81,13 @@ class Client(Uploads, Jobs):
 
     def write_tooling(self, name: str, tooling: str | Json, seen: str | None = None, why: str = "") -> ToolingAnswer:
         """Write a tooling, from the text of a tooling file or from its keys; what it replaces stays as a version."""
-        return read(ToolingAnswer, self._send_tooling("PUT", f"/toolings/{name}", tooling, match(seen), {"why": why} if why else {}))
+        return read(ToolingAnswer, self._send_toml("PUT", f"/toolings/{name}", tooling, match(seen), {"why": why} if why else {}))
 
     def differences(self, name: str, tooling: str | Json) -> Differences:
         """Return where a tooling differs from that of the library."""
-        return read(Differences, self._send_tooling("POST", f"/toolings/{name}/differences", tooling, {}, {}))
+        return read(Differences, self._send_toml("POST", f"/toolings/{name}/differences", tooling, {}, {}))
 
-    def _send_tooling(self, method: str, path: str, tooling: str | Json, headers: Json, params: Json) -> httpx2.Response:
+    def _send_toml(self, method: str, path: str, tooling: str | Json, headers: Json, params: Json) -> httpx2.Response:
         if isinstance(tooling, str):
             kind = {"Content-Type": "application/toml", **headers}
             return self.send(method, path, content=tooling.encode(), headers=kind, params=dict(params))
@@ -128,6 +130,42 @@ class Client(Uploads, Jobs):
     def toolings(self, limit: int = 50) -> Iterator[ToolingSummary]:
         """Yield all toolings."""
         return self.all("/toolings", Page[ToolingSummary], limit)
+
+    def write_robot(self, name: str, robot: str | Json, seen: str | None = None, why: str = "") -> RobotAnswer:
+        """Write a robot: the text of ROBOT.toml, or its keys; `seen` is the etag of what it replaces."""
+        return read(RobotAnswer, self._send_toml("PUT", f"/robots/{name}", robot, match(seen), {"why": why} if why else {}))
+
+    def robot(self, name: str) -> RobotAnswer:
+        """Return a robot."""
+        return read(RobotAnswer, self.send("GET", f"/robots/{name}"))
+
+    def robot_file(self, name: str) -> str:
+        """Return the text of ROBOT.toml."""
+        return self.send("GET", f"/robots/{name}", headers={"Accept": "application/toml"}).text
+
+    def robots(self, limit: int = 50) -> Iterator[RobotSummary]:
+        """Yield all robots."""
+        return self.all("/robots", Page[RobotSummary], limit)
+
+    def forget_robot(self, name: str, seen: str | None = None) -> None:
+        """Delete a robot."""
+        self.send("DELETE", f"/robots/{name}", headers=match(seen))
+
+    def posture(self, robot: Json, **further: Any) -> PostureAnswer:
+        """Return what an arm is at a posture: {"robot": name or keys, "posture_deg": [...]}."""
+        return read(PostureAnswer, self.send("POST", "/robots/posture", json={"robot": robot, **further}))
+
+    def along_path(self, robot: Json, tooling: str | Json, path: Sequence[Sequence[float]]) -> PathAnswer:
+        """Return the postures that bring a tool's tip to the places of a path, rows x, y, z [mm] (and i, j, k)."""
+        return read(PathAnswer, self.send("POST", "/robots/path", json={"robot": robot, "tooling": tooling, "places": path}))
+
+    def limit_map(self, robot: Json, tooling: str | Json, path: Sequence[Sequence[float]], **further: Any) -> MapAnswer:
+        """Return the stability limits at the places of a path."""
+        return read(MapAnswer, self.send("POST", "/robots/map", json={"robot": robot, "tooling": tooling, "places": path, **further}))
+
+    def path_of(self, text: str) -> PathPreview:
+        """Return the places of PATH.csv; nothing is stored."""
+        return read(PathPreview, self.send("POST", "/robots/path/preview", content=text.encode(), headers={"Content-Type": "text/csv"}))
 
     def import_toolings(self, library: bytes, **assumed: Any) -> ImportAnswer:
         """Import the toolings of a Fusion 360 or HSM tool library; `replace` overwrites existing ones."""
@@ -223,18 +261,18 @@ class Client(Uploads, Jobs):
         """Delete a tooling."""
         self.send("DELETE", f"/toolings/{name}", headers=match(seen))
 
-    def tooltip(self, machine: str, tooling: str | Json, **further: Any) -> TipAnswer:
-        """Return a tooltip FRF."""
-        return read(TipAnswer, self.send("POST", "/tooltip", json={"machine": machine, "tooling": tooling, **further}))
+    def tooltip(self, machine: str | Json, tooling: str | Json, **further: Any) -> TipAnswer:
+        """Return a tooltip FRF, on a machine by its id or on a robot at a posture, as `posture` takes it."""
+        return read(TipAnswer, self.send("POST", "/tooltip", json={**standing_on(machine), "tooling": tooling, **further}))
 
-    def tooltip_file(self, machine: str, tooling: str | Json, **further: Any) -> str:
+    def tooltip_file(self, machine: str | Json, tooling: str | Json, **further: Any) -> str:
         """Return the text of FRF.csv."""
-        body = {"machine": machine, "tooling": tooling, **further}
+        body = {**standing_on(machine), "tooling": tooling, **further}
         return self.send("POST", "/tooltip", json=body, headers={"Accept": "text/csv"}).text
 
-    def advice(self, machine: str, *toolings: str | Json, **further: Any) -> AdviceAnswer:
+    def advice(self, machine: str | Json, *toolings: str | Json, **further: Any) -> AdviceAnswer:
         """Return the cuts of highest removal rate, and the margins of planned cuts."""
-        return read(AdviceAnswer, self.send("POST", "/advice", json={"machine": machine, "toolings": list(toolings), **further}))
+        return read(AdviceAnswer, self.send("POST", "/advice", json={**standing_on(machine), "toolings": list(toolings), **further}))
 
     def forces(self, machine: str, tooling: str | Json, recording: Path, air: Path | None = None, **further: Any) -> ForceAnswer:
         """Return the forces of a local recording."""

@@ -83,4 +83,12 @@ def carry(job: Job, context: JobContext) -> Outcome:
         known[i].progress()
         found.append(context.remember(f"lobes.{i}", partial(guarded, tasks.lobes, machine, tooling, question, known[i])))
     context.progress(STAGE, len(toolings) * len(question.speeds), len(toolings) * len(question.speeds))
-    return Outcome("done", "", texts={"answer": json.dumps({"machine": job.machine, "toolings": found}, allow_nan=False)})
+    return Outcome("done", "", texts={"answer": json.dumps({"machine": _called(job), "toolings": found}, allow_nan=False)})
+
+
+def _called(job: Job) -> str:
+    """What an answer calls the machine, or the robot."""
+    if job.machine:
+        return job.machine
+    robot = json.loads(job.request)["robot"]["robot"]
+    return str(robot if isinstance(robot, str) else robot["robot"]["name"])

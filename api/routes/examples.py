@@ -1,4 +1,4 @@
-"""Example files: toolings, a campaign, tested cuts, modes, a tool library and recordings."""
+"""Example files: toolings, a campaign, tested cuts, modes, a tool library, recordings and published robots."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from api.transfer.archives import zipped, zipped_bytes
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.io.toml_text import read_toml
+from rcsa_ident.sample_files import sample_robots
 
 router = APIRouter(prefix="/examples", tags=["examples"], route_class=Guarded)
 _FOLDER = Folder(__file__).resolve().parents[1] / "examples"
@@ -30,12 +31,18 @@ _ABOUT = {
     "tool-library.json": "A tool library as exported by CAM programs.",
     "small-campaign.zip": "A campaign of two cuts with their air cuts: to see uploads and verdicts.",
 }
+_ROBOTS = {
+    "tx200.toml": "A robot: Stäubli TX200, angles of its encoders, all zero upright.",
+    "kr210.toml": "A robot: KUKA KR210, with a spindle; angles of the model.",
+    "kr500.toml": "A robot: KUKA KR500 R2830, postures and stiffness alone.",
+}
 SAMPLE, _SAMPLE_ABOUT = "sample-campaign.zip", "A campaign with two toolings: enough for an identification."
 
 
 @router.get("", summary="List examples", openapi_extra=guard("read"), responses=problems())
 def list_examples(components: ThisService) -> Examples:
     items = [Example(name=name, size_bytes=(_FOLDER / name).stat().st_size, about=about) for name, about in _ABOUT.items()]
+    items += [Example(name=name, size_bytes=path.stat().st_size, about=_ROBOTS[name]) for name, path in _robots().items()]
     members = _sample(components)
     if members:
         items.append(Example(name=SAMPLE, size_bytes=zipped_bytes(members), about=_SAMPLE_ABOUT))
@@ -55,11 +62,18 @@ def list_examples(components: ThisService) -> Examples:
 def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], components: ThisService) -> Response:
     if name in _ABOUT:
         return FileResponse(_FOLDER / name, media_type=_TYPES[(_FOLDER / name).suffix], filename=name)
+    if name in (robots := _robots()):
+        return FileResponse(robots[name], media_type=_TYPES[".toml"], filename=name)
     members = _sample(components) if name == SAMPLE else []
     if not members:
         raise Problem(404, "there is no such example")
     headers = {"Content-Disposition": f'attachment; filename="{SAMPLE}"'}
     return StreamingResponse(zipped(members), media_type=_TYPES[".zip"], headers=headers)
+
+
+def _robots() -> dict[str, Folder]:
+    """The published arms that the package carries, by the names of their files."""
+    return {path.name: path for path in sample_robots().values() if path.name in _ROBOTS}
 
 
 def _sample(components: Components) -> list[tuple[str, Folder]]:

@@ -15,7 +15,7 @@ from api.components import Components, ThisService
 from api.conventions import BODY, Repeat, guard, problems, while_there
 from api.jobs.lobes import asked
 from api.live import jobs
-from api.lookups import known_machine, tooling_source
+from api.lookups import tip_source, tooling_source
 from api.schemas.jobs import JobAnswer, LobeJob
 from api.schemas.queries import AdviceAnswer, AdviceQuery, LobeAnswer, LobeQuery, TipAnswer, TipQuery
 from api.schemas.toolings import ToolingKeys
@@ -41,7 +41,7 @@ Later = Annotated[str | None, Header(alias="Prefer", max_length=200, description
     responses={200: {"description": "Receptances.", "content": {CSV: {"schema": {"type": "string"}}}}, **problems(404, *BODY)},
 )
 async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: WhoAsks) -> Any:
-    machine, (tooling,) = await _subject(parts, caller.group, body.machine, [body.tooling])
+    machine, _, (tooling,) = await _subject(parts, caller.group, body, [body.tooling])
     csv = CSV in request.headers.get("accept", "")
     found = parts.work.run(tasks.tooltip, machine, tooling, body.request(parts.settings.work_seconds), csv)
     answer = await while_there(request, found)
@@ -58,20 +58,22 @@ async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: 
 )
 async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: WhoAsks, prefer: Later = None, repeat: Repeat = None) -> Any:
     question = body.request(parts.settings.work_seconds)
-    machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
+    machine, called, toolings = await _subject(parts, caller.group, body, body.toolings)
     most = parts.settings.job_work_seconds
     wanted = re.split(r"[\s,;]+", (prefer or "").lower())
     if "respond-async" not in wanted:
         try:
             found = await while_there(request, _each(parts, tasks.lobes, machine, toolings, question))
-            return LobeAnswer.model_validate({"machine": body.machine, "toolings": found})
+            return LobeAnswer.model_validate({"machine": called, "toolings": found})
         except TooLong as error:
             if error.seconds * len(toolings) > most:
                 raise
     text = asked(machine, toolings, body.request(most))
     words = body.model_dump_json()
     watched = now() if "while-watched" in wanted else None
-    job = Job(new_id(), caller.group, LOBES, body.machine, None, words, "queued", now(), key=caller.id, who=caller.name, watched=watched)
+    job = Job(
+        new_id(), caller.group, LOBES, body.machine or "", None, words, "queued", now(), key=caller.id, who=caller.name, watched=watched
+    )
     digest = hashlib.sha256(words.encode()).hexdigest()
     again = None if repeat is None else (repeat, digest)
     kept = await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again)
@@ -123,9 +125,9 @@ def cancel_lobes(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response: 
 )
 async def advice(body: AdviceQuery, request: Request, parts: ThisService, caller: WhoAsks) -> AdviceAnswer:
     question = body.advice(parts.settings.work_seconds)
-    machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
+    machine, called, toolings = await _subject(parts, caller.group, body, body.toolings)
     found = await while_there(request, _each(parts, tasks.advice, machine, toolings, question))
-    return AdviceAnswer.model_validate({"machine": body.machine, "toolings": found})
+    return AdviceAnswer.model_validate({"machine": called, "toolings": found})
 
 
 async def _each(parts: Components, call: Any, machine: MachineText, toolings: list[ToolingSource], question: Any) -> list[Any]:
@@ -138,12 +140,13 @@ async def _each(parts: Components, call: Any, machine: MachineText, toolings: li
 
 
 async def _subject(
-    parts: Components, group: str, machine: str, toolings: list[str | ToolingKeys]
-) -> tuple[MachineText, list[ToolingSource]]:
-    """Return the machine and the toolings, each from the library or as it came."""
+    parts: Components, group: str, body: TipQuery | LobeQuery | AdviceQuery, toolings: list[str | ToolingKeys]
+) -> tuple[MachineText, str, list[ToolingSource]]:
+    """Return the machine or the robot, what it is called, and the toolings, each from the library or as it came."""
 
-    def look() -> tuple[MachineText, list[ToolingSource]]:
-        known = known_machine(parts, group, machine)
-        return known, [tooling_source(parts, group, tooling, i + 1) for i, tooling in enumerate(toolings)]
+    def look() -> tuple[MachineText, str, list[ToolingSource]]:
+        return *tip_source(parts, group, body.machine, body.robot), [
+            tooling_source(parts, group, tooling, i + 1) for i, tooling in enumerate(toolings)
+        ]
 
     return await run_in_threadpool(look)

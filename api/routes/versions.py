@@ -1,4 +1,4 @@
-"""Versions of toolings and identifications, what they differ in, their restoration, and the audit trail of all changes."""
+"""Versions of toolings, robots and identifications, what they differ in, their restoration, and the audit trail of all changes."""
 
 from __future__ import annotations
 
@@ -13,26 +13,31 @@ from api.components import Components, ThisService
 from api.conventions import BODY, Limit, MachineId, ToolingName, Why, expected, found_or_404, guard, page, problems, tagged
 from api.lookups import machine_of
 from api.problems import Problem
+from api.routes import robots
 from api.routes.machines import CSV, summary_of
 from api.routes.toolings import JSON, TOML, TOOLING_BODY, answer_of, summary, text_of_body
 from api.schemas.common import NAME_PATTERN, Page
 from api.schemas.machines import Identification, IdentificationSummary
+from api.schemas.robots import RobotAnswer, RobotKeys
 from api.schemas.toolings import ToolingAnswer, ToolingKeys
-from api.schemas.versions import ChangeAnswer, Difference, Differences, Kind, ToolingVersion
+from api.schemas.versions import ChangeAnswer, Difference, Differences, Kind, RobotVersion, ToolingVersion
 from api.security import Caller, Guarded, WhoAsks, now
-from api.stores.changes import IDENTIFICATION, TOOLING, Change
+from api.stores.changes import IDENTIFICATION, ROBOT, TOOLING, Change
 from api.stores.entities import Document, Documents, Stale, digest_of
+from api.stores.entities import summary_of as stored_summary
 from api.work.machine_cache import is_result
+from api.work.robots import parsed as robot_keys
 from api.work.toolings import differences, parsed
 
 router = APIRouter(tags=["versions"], route_class=Guarded)
 Version = Annotated[int, Path(ge=1, le=2_000_000_000, description="`version` of an entry of the trail.")]
 _MACHINE, _TOOLING = "/machines/{id}/identification/versions/{version}", "/toolings/{name}/versions/{version}"
+_ROBOT = "/robots/{name}/versions/{version}"
 
 
 @router.get(
     "/changes",
-    summary="The audit trail: who wrote which tooling, machine or identification, when and why, newest first",
+    summary="The audit trail: who wrote which tooling, robot, machine or identification, when and why, newest first",
     openapi_extra=guard("read"),
     responses=problems(422),
 )
@@ -40,7 +45,7 @@ def changes(
     components: ThisService,
     caller: WhoAsks,
     kind: Kind | None = None,
-    name: Annotated[str | None, Query(pattern=NAME_PATTERN, description="Of a tooling, or id of a machine.")] = None,
+    name: Annotated[str | None, Query(pattern=NAME_PATTERN, description="Of a tooling or a robot, or id of a machine.")] = None,
     after: Annotated[str, Query(pattern=r"^[0-9]{0,18}$", description="`next` of the previous page.")] = "",
     limit: Limit = 50,
 ) -> Page[ChangeAnswer]:
@@ -90,6 +95,33 @@ def restore_tooling(
     document = Document(caller.group, name, found.text, json.dumps(summary(found.text)), digest_of(found.text), now())
     _restore(components.store.toolings, document, found, request, response, caller, why)
     return answer_of(document)
+
+
+@router.get(_ROBOT, summary="A version of a robot", openapi_extra=guard("read"), responses=problems(404, 422))
+def robot_version(name: robots.RobotName, version: Version, components: ThisService, caller: WhoAsks) -> RobotVersion:
+    found = _version(components, caller, ROBOT, name, version)
+    there, keys = components.store.robots.get(caller.group, name), robot_keys(found.text)
+    compared = [] if there is None else _differences(robot_keys(there.text), keys)
+    return RobotVersion(change=_answer(found), robot=RobotKeys.model_validate(keys), differences=compared)
+
+
+@router.post(
+    f"{_ROBOT}/restore",
+    summary="Write a version of a robot again, also one that was deleted",
+    description="If-Match or If-None-Match: * protect against overwriting concurrent changes. What it replaces stays as a version; "
+    "409 where the version is what is there now.",
+    openapi_extra=guard("upload"),
+    responses={201: {"model": RobotAnswer, "description": "It was deleted before."}, **problems(404, 409, 412, 413, 422, 500)},
+)
+def restore_robot(
+    name: robots.RobotName, version: Version, request: Request, response: Response, components: ThisService, caller: WhoAsks, why: Why = ""
+) -> RobotAnswer:
+    found = _version(components, caller, ROBOT, name, version)
+    document = Document(caller.group, name, found.text, found.summary, found.digest, now(), found.summary_digest)
+    # a damaged one is not written again
+    stored_summary(document)
+    _restore(components.store.robots, document, found, request, response, caller, why)
+    return robots.answer_of(document)
 
 
 @router.get(

@@ -53,7 +53,7 @@ class JobAnswer(Answer):
 
     id: str
     kind: Literal["identification", "lobes"]
-    machine: str
+    machine: str = Field(description="Its id; empty where a robot is asked.")
     campaign: str | None
     state: JobState
     progress: Progress | None

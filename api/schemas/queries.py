@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Field
 
 from api.schemas.common import Answer, Body, EngagementRows, Id, Line, Name
 from api.schemas.machines import Curve
+from api.schemas.robots import Posed
 from api.schemas.toolings import EXAMPLE, ToolingKeys
 from api.work.requests import AdviceRequest, LobeRequest, TipRequest
 from rcsa_ident.cutting.conditions import Block, Engagement
@@ -36,6 +37,8 @@ Rpm = Annotated[float, Field(ge=100.0, le=200_000.0)]
 Hertz = Annotated[float, Field(ge=1.0, le=20_000.0)]
 Depth = Annotated[float, Field(gt=0.0, le=500.0)]
 Tooling = Annotated[Name | ToolingKeys, Field(description="Name in the library, or the tooling itself.")]
+OnMachine = Annotated[Id | None, Field(description="Id of a machine; in its place `robot` takes an arm at a posture.")]
+OnRobot = Annotated[Posed | None, Field(description="In place of a machine.")]
 Spread = Annotated[Percent, Field(description="How well the tool-holder's stiffness is known [%]: part of the bands.")]
 
 
@@ -44,7 +47,8 @@ class TipQuery(Body):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"machine": "m1", "tooling": EXAMPLE, "to_hz": 4000.0}]})
 
-    machine: Id
+    machine: OnMachine = None
+    robot: OnRobot = None
     tooling: Tooling
     from_hz: Hertz | None = Field(None, description="By default 100, or where a measured flange begins.")
     to_hz: Hertz | None = Field(None, description="By default the end of the identified band.")
@@ -180,7 +184,8 @@ class TestedCut(Body):
 class Milled(Body):
     """Which toolings on which machine, and which cut."""
 
-    machine: Id
+    machine: OnMachine = None
+    robot: OnRobot = None
     toolings: list[Tooling] = Field(min_length=1, max_length=MOST_TOOLINGS, description="Several are compared.")
     cut: Cut = Field(default_factory=Cut)
     speeds: Speeds = Field(default_factory=Speeds)
@@ -308,7 +313,7 @@ class ToolingLobes(Answer):
 class LobeAnswer(Answer):
     """Lobes of all toolings, in the order of the query."""
 
-    machine: str
+    machine: str = Field(description="Its id, or the robot's name.")
     toolings: list[ToolingLobes]
 
 
@@ -417,5 +422,5 @@ class ToolingAdvice(Answer):
 class AdviceAnswer(Answer):
     """Advice for all toolings, in the order of the query."""
 
-    machine: str
+    machine: str = Field(description="Its id, or the robot's name.")
     toolings: list[ToolingAdvice]

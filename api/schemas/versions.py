@@ -1,4 +1,4 @@
-"""Versions of toolings and identifications, and the audit trail that they are part of."""
+"""Versions of toolings, robots and identifications, and the audit trail that they are part of."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Literal
 from pydantic import Field
 
 from api.schemas.common import Answer
+from api.schemas.robots import RobotKeys
 from api.schemas.toolings import ToolingKeys
 
-Kind = Literal["tooling", "machine", "identification"]
+Kind = Literal["tooling", "robot", "machine", "identification"]
 Action = Literal["made", "changed", "restored", "deleted"]
 Value = int | float | str | list[int | float] | None
 
@@ -19,9 +20,9 @@ class ChangeAnswer(Answer):
 
     id: int
     kind: Kind
-    name: str = Field(description="Of the tooling, or id of the machine.")
+    name: str = Field(description="Of the tooling or the robot, or id of the machine.")
     title: str = Field(description="Its name at that time.")
-    version: int = Field(description="Counts the changes of one tooling, machine or identification.")
+    version: int = Field(description="Counts the changes of one tooling, robot, machine or identification.")
     action: Action
     restores: int | None = Field(description="Version that is written again.")
     created: str = Field(description="UTC, ISO 8601.")
@@ -33,7 +34,7 @@ class ChangeAnswer(Answer):
 
 
 class Difference(Answer):
-    """A key that differs between two toolings; null where one of them does not have it."""
+    """A key that differs between two toolings, or two robots; null where one of them does not have it."""
 
     field: str
     old: Value
@@ -53,3 +54,11 @@ class ToolingVersion(Answer):
     change: ChangeAnswer
     tooling: ToolingKeys
     differences: list[Difference] = Field(description="From the tooling in the library to this version; empty where there is none.")
+
+
+class RobotVersion(Answer):
+    """A version of a robot."""
+
+    change: ChangeAnswer
+    robot: RobotKeys
+    differences: list[Difference] = Field(description="From the robot that is kept to this version; empty where there is none.")

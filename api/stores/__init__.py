@@ -1,1 +1,1 @@
-"""The store: keys, machines with their identifications, toolings, campaigns and jobs; every row belongs to a group."""
+"""The store: keys, machines with their identifications, toolings, robots, campaigns and jobs; every row belongs to a group."""

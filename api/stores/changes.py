@@ -1,4 +1,4 @@
-"""The audit trail: who wrote which tooling, machine or identification, when and why, with the text of every version."""
+"""The audit trail: who wrote which tooling, robot, machine or identification, when and why, with the text of every version."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 #: Kinds of what changes.
-TOOLING, MACHINE, IDENTIFICATION = "tooling", "machine", "identification"
-KINDS = (TOOLING, MACHINE, IDENTIFICATION)
+TOOLING, ROBOT, MACHINE, IDENTIFICATION = "tooling", "robot", "machine", "identification"
+KINDS = (TOOLING, ROBOT, MACHINE, IDENTIFICATION)
 #: What happens to it.
 MADE, CHANGED, RESTORED, DELETED = "made", "changed", "restored", "deleted"
 ACTIONS = (MADE, CHANGED, RESTORED, DELETED)
@@ -47,7 +47,7 @@ class Change:
     id : int
         Increases over all entries.
     kind, name : str
-        One of `KINDS`; name of the tooling, or id of the machine.
+        One of `KINDS`; name of the tooling or the robot, or id of the machine.
     title : str
         As people call it, then: a machine's name stays readable when it is gone.
     version : int

@@ -88,12 +88,12 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A named text: a tooling, or the identification of a machine.
+    """A named text: a tooling, a robot, or the identification of a machine.
 
     Parameters
     ----------
     name : str
-        Of the tooling, or id of the machine.
+        Of the tooling or the robot, or id of the machine.
     text : str
     summary : str
         Content of list entries, JSON.
@@ -140,9 +140,9 @@ def whole(text: str, digest: str, what: str, mend: str) -> str:
 
 
 def summary_of(document: Document) -> dict[str, Any]:
-    """Return the summary of a tooling or an identification; raises `Damaged` where it is not what was stored."""
+    """Return the summary of a tooling, a robot or an identification; raises `Damaged` where it is not what was stored."""
     what = f"summary of {document.name}"
-    return dict(json.loads(whole(document.summary, document.summary_digest, what, "write the same tooling or identification again")))
+    return dict(json.loads(whole(document.summary, document.summary_digest, what, "write the same tooling, robot or identification again")))
 
 
 class Keys(Protocol):
@@ -222,6 +222,7 @@ class Store(Protocol):
     machines: Machines
     identifications: Documents
     toolings: Documents
+    robots: Documents
     changes: Changes
     campaigns: Campaigns
     recordings: Recordings

@@ -22,7 +22,9 @@ class Job:
 
     Parameters
     ----------
-    id, group, kind, machine : str
+    id, group, kind : str
+    machine : str
+        Id of the one that it belongs to, and is deleted with; empty where it asks of a robot.
     campaign : str or None
     request : str
         Body of the request, JSON.

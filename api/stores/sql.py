@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
 from api.stores.campaigns import Campaigns, Recordings
-from api.stores.changes import IDENTIFICATION, MACHINE, TOOLING, UNSIGNED, Changes, Note
+from api.stores.changes import IDENTIFICATION, MACHINE, ROBOT, TOOLING, UNSIGNED, Changes, Note
 from api.stores.database import Database, open_engine
 from api.stores.entities import ABSENT, Document, Documents, Expected, Key, Keys, Machine, Machines, Stale, Taken, whole
 from api.stores.idempotency import earlier, forget_old
@@ -40,6 +40,7 @@ class SqlStore(Database):
         self._toolings = SqlDocuments(self, tables.toolings, TOOLING)
         self.identifications: Documents = self._identifications
         self.toolings: Documents = self._toolings
+        self.robots: Documents = SqlDocuments(self, tables.robots, ROBOT)
         self.changes: Changes = SqlChanges(self)
         self.campaigns: Campaigns = SqlCampaigns(self)
         self.recordings: Recordings = SqlRecordings(self)
@@ -198,7 +199,7 @@ class SqlDocuments:
             row = connection.execute(select(*self.columns).where(t.c.group == group, t.c.name == name)).first()
         if row is None:
             return None
-        what = f"tooling {name}" if self.kind == TOOLING else "identification of the machine"
+        what = "identification of the machine" if self.kind == IDENTIFICATION else f"{self.kind} {name}"
         whole(row.text, row.digest, what, "write it again, or restore one of its versions")
         return Document(**row._asdict())
 

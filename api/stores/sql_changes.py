@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, and_, delete, exists, func, insert, or_, select, update
 
 from api.stores import tables
-from api.stores.changes import CHANGED, DELETED, IDENTIFICATION, MACHINE, MADE, RESTORED, TOOLING, Change, Note
+from api.stores.changes import CHANGED, DELETED, IDENTIFICATION, MACHINE, MADE, RESTORED, ROBOT, TOOLING, Change, Note
 from api.stores.database import Database
 from api.stores.entities import whole
 
@@ -16,7 +16,7 @@ from api.stores.entities import whole
 def _holds() -> ColumnElement[bool]:
     """Whether a version is what is there now; a text that has come to harm is another one, which the version mends."""
     c, found = tables.changes, []
-    for kind, t in ((TOOLING, tables.toolings), (IDENTIFICATION, tables.identifications)):
+    for kind, t in ((TOOLING, tables.toolings), (ROBOT, tables.robots), (IDENTIFICATION, tables.identifications)):
         same = (t.c.group == c.c.group, t.c.name == c.c.name, t.c.digest == c.c.digest, t.c.text == c.c.text)
         found.append(and_(c.c.kind == kind, exists().where(*same)))
     return or_(*found).label("holds")
@@ -85,7 +85,7 @@ def _log(connection: Connection, kind: str, thing: tuple[str, str], action: str,
     here = (t.c.group == group, t.c.kind == kind, t.c.name == name)
     last = connection.execute(select(func.coalesce(func.max(t.c.version), 0)).where(*here)).scalar_one()
     title = name
-    if kind != TOOLING:
+    if kind in (MACHINE, IDENTIFICATION):
         title = connection.execute(select(m.c.name).where(m.c.group == group, m.c.id == name)).scalar() or name
     row = {"group": group, "kind": kind, "name": name, "title": title, "version": last + 1, "action": action, "created": when}
     noted = {"key": note.key, "who": note.who, "why": note.why, "restores": note.restores}

@@ -37,7 +37,7 @@ class SqlJobs:
                         return first
                 # locks the machine: it cannot be deleted until the job is stored
                 there = select(m.c.id).where(m.c.group == job.group, m.c.id == job.machine).with_for_update()
-                if connection.execute(there).first() is None:
+                if job.machine and connection.execute(there).first() is None:
                     raise KeyError(job.machine)
                 waiting = select(func.count()).where(t.c.group == job.group, t.c.state.in_(OPEN))
                 if connection.execute(waiting).scalar_one() >= most:

@@ -112,6 +112,7 @@ def _documents(name: str) -> Table:
 
 identifications = _documents("identifications")
 toolings = _documents("toolings")
+robots = _documents("robots")
 changes = Table(
     "changes",
     metadata,
@@ -238,6 +239,7 @@ job_workers = Table(
 COUNTED = {
     "machines": (machines,),
     "toolings": (toolings,),
+    "robots": (robots,),
     "identifications": (identifications,),
     "versions": (changes,),
     "campaigns": (campaigns,),

@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from api.work.requests import MachineText
+from api.work.robots import is_posed, posed
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.machine import IdentifiedMachine
@@ -82,7 +83,9 @@ def parsed(text: str) -> dict[str, Any]:
 
 
 def read(text: str) -> Machine:
-    """Return a machine whose receptances are finite, of a RESULT.json or a FLANGE.csv."""
+    """Return a machine whose receptances are finite, of a RESULT.json, a FLANGE.csv or a robot at a posture."""
+    if is_posed(text):
+        return posed(text)
     if not is_result(text):
         try:
             machine = flange_machine_of(text)

@@ -222,7 +222,7 @@ def warm() -> None:
     """Compile the kernels of quick answers, or load them from the cache."""
     from rcsa_ident.workflows.compile_kernels import STEPS
 
-    for step in ("tool-holder", "lobes"):
+    for step in ("tool-holder", "lobes", "robot"):
         STEPS[step]()
 
 

@@ -48,7 +48,7 @@ class TooLong(InputError):
 
 @dataclass(frozen=True, slots=True)
 class MachineText:
-    """What is known of a machine, as it is kept: RESULT.json or FLANGE.csv; the digest tells a worker whether it knows it already."""
+    """What is known of a machine, as it is kept: RESULT.json, FLANGE.csv or a robot at a posture. By the digest a worker knows it."""
 
     digest: str
     text: str

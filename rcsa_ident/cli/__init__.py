@@ -31,7 +31,9 @@ from rcsa_ident.cli import (  # noqa: E402
     plan,
     ring,
     robot,
+    robot_draw,
     robot_identify,
+    robot_import,
     robot_plan,
     schema,
     tap,
@@ -92,7 +94,8 @@ _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
 for _title, _commands in _COMMANDS.items():
     for _command in _commands:
         app.command(_command.__name__.replace("_", "-"), cls=_Literal, rich_help_panel=_title)(_command)
-for _name, _command in {**robot.COMMANDS, "identify": robot_identify.identify, "plan": robot_plan.plan}.items():
+_OF_ROBOTS = robot.COMMANDS | robot_draw.COMMANDS | robot_import.COMMANDS | robot_identify.COMMANDS | robot_plan.COMMANDS
+for _name, _command in _OF_ROBOTS.items():
     robot.robot_app.command(_name, cls=_Literal)(_command)
 app.add_typer(robot.robot_app, name="robot", rich_help_panel="Milling robots")
 

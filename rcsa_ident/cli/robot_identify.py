@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -160,3 +160,7 @@ def _from_tests(robot: Path, records: Sequence[Path], out: Path, check: Sequence
     for warning in warnings:
         warn(warning)
     say(f"written: {out} ({stages.seconds['springs']:.2f} s)")
+
+
+#: By their names on the command line.
+COMMANDS: dict[str, Any] = {"identify": identify}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -131,3 +131,7 @@ def _box(text: str) -> tuple[FloatArray, FloatArray]:
     if len(found) != 6 or not all(math.isfinite(each) for each in found):
         raise InputError("--box", text, "six lengths with blanks between: x, y, z of the lowest corner, then of the highest [mm]")
     return 1e-3 * np.array(found[:3]), 1e-3 * np.array(found[3:])
+
+
+#: By their names on the command line.
+COMMANDS: dict[str, Any] = {"plan": plan}

@@ -9,7 +9,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_speed_csv
-from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.units import to_hz, to_rpm
 
 PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("i", "j", "k")
@@ -27,7 +27,15 @@ def read_path(path: str | Path) -> tuple[FloatArray, FloatArray]:
     InputError
         Names the file and the line.
     """
-    table = read_table(path, "path")
+    return _path_of(read_table(path, "path"))
+
+
+def path_of(text: str, where: str) -> tuple[FloatArray, FloatArray]:
+    """Return places and axes of a text as `read_path` finds them in a file; `where` is named in the messages."""
+    return _path_of(table_of(text, "path", where))
+
+
+def _path_of(table: TextTable) -> tuple[FloatArray, FloatArray]:
     axis = AXIS if any(name in table.header for name in AXIS) else ()
     table.check_header((*PLACE, *axis), f"columns {', '.join(PLACE)}, and {', '.join(AXIS)} of the tool's axis")
     if not table.lines:

@@ -29,6 +29,10 @@ from rcsa_ident.identification.parameters import AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.machine.mode_synthesis import FLANGE
+from rcsa_ident.machine.robot.flexible import FlexibleRobot
+from rcsa_ident.machine.robot.inertia import accelerations
+from rcsa_ident.machine.robot.kinematics import posed
+from rcsa_ident.machine.robot.model import Body, Frame, Joint, RobotModel
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.turning_machine import TurningMachine
 from rcsa_ident.observer.coupled_filter import coupled_filter
@@ -49,6 +53,7 @@ from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles
 from rcsa_ident.workflows.listen import listen_to
+from rcsa_ident.workflows.robot_postures import at_posture
 
 _CUTTER = Cutter(2, 0.012)
 _COEFFICIENTS = CuttingCoefficients(9e8, 0.3)
@@ -149,6 +154,14 @@ def _tips() -> None:
     TurningMachine(modes, (2000.0, 8000.0), (500.0, 1000.0), LumpedJoint(2e9, 5e6)).tip(_assembly())
 
 
+def _robot() -> None:
+    """An arm at a posture, and what its torques move."""
+    x, rod = np.array([1.0, 0.0, 0.0]), Body(50.0, np.array([0.0, 0.0, 0.5]), np.diag([4.0, 4.0, 0.5]))
+    arm = RobotModel("warm", (Joint("J1", Frame(), x, rod, 1e6, 200.0),), Frame(offset=np.array([0.0, 0.0, 1.0])))
+    at_posture(FlexibleRobot(arm), np.zeros(1))
+    accelerations(posed(arm, np.zeros(1)), np.zeros(1), np.zeros(1), arm.gravity)
+
+
 def _lobes_in_time() -> None:
     process, speeds = MillingProcess(_CUTTER, _COEFFICIENTS, _CONDITIONS.engagement), np.array([900.0])
     for method in (FullDiscretisation(), TimeDomain(periods=20)):
@@ -186,6 +199,7 @@ STEPS: dict[str, Callable[[], None]] = {
     "tips": _tips,
     "lobes": _lobes,
     "lobes in time": _lobes_in_time,
+    "robot": _robot,
     "force observer": _observer,
     "virtual machine": _virtual_machine,
 }

@@ -148,7 +148,7 @@ def test_damaged_summaries_are_told_and_heal(client, store, result):
     for table, other in (("identifications", '{"axes": []}'), ("toolings", "nonsense")):
         with store.writing() as connection:
             connection.execute(text(f"UPDATE {table} SET summary = :other"), {"other": other})
-    words = "is damaged: its content is not what was stored; write the same tooling or identification again"
+    words = "is damaged: its content is not what was stored; write the same tooling, robot or identification again"
     for call in (partial(client.machine, machine), lambda: list(client.toolings()), partial(client.lobes, machine, "T1")):
         assert words in refused(500, call).detail
     # their texts are whole, and written again they mend it

@@ -10,6 +10,7 @@ import pytest
 from api.client import Client
 from api.components import MOST_BUCKETS, Rates
 from api.live.jobs import events
+from api.schemas.robots import EXAMPLE as ROBOT
 from api.security import SCOPES, Caller
 from tests.api.identifying import job
 from tests.api.in_process import refused, service
@@ -37,6 +38,16 @@ CALLS = [
     ("POST", "/toolings/t/versions/v/restore", None, "upload"),
     ("GET", "/machines/m/identification/versions/v", None, "read"),
     ("POST", "/machines/m/identification/versions/v/restore", None, "upload"),
+    ("PUT", "/robots/t", ROBOT, "upload"),
+    ("GET", "/robots", None, "read"),
+    ("GET", "/robots/t", None, "read"),
+    ("DELETE", "/robots/t", None, "upload"),
+    ("GET", "/robots/t/versions/v", None, "read"),
+    ("POST", "/robots/t/versions/v/restore", None, "upload"),
+    ("POST", "/robots/posture", {"robot": {"robot": "t", "posture_deg": [0.0]}}, "run"),
+    ("POST", "/robots/path", {"robot": {"robot": "t", "posture_deg": [0.0]}, "tooling": "t", "places": [[0, 0, 0]]}, "run"),
+    ("POST", "/robots/map", {"robot": {"robot": "t", "posture_deg": [0.0]}, "tooling": "t", "places": [[0, 0, 0]]}, "run"),
+    ("POST", "/robots/path/preview", None, "read"),
     ("POST", "/toolings/drawing", example(), "read"),
     ("POST", "/toolings/import", {"data": []}, "upload"),
     ("GET", "/materials", None, "read"),

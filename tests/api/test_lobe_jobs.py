@@ -14,6 +14,7 @@ from api.jobs import job_context, lobes
 from api.jobs.codec import decode
 from api.jobs.worker import carry
 from api.schemas.jobs import PartialLobes
+from api.schemas.robots import EXAMPLE as ROBOT
 from api.stores.jobs import PARTIAL
 from tests.api.identifying import Steps, carried
 from tests.api.in_process import refused, service
@@ -43,6 +44,21 @@ def test_as_a_job_they_are_the_same(shop, store, tmp_path):
     assert found.answer == at_once
     assert [name for _, name in engine.computed] == ["lobes.0", "lobes.1"]
     assert [kind for kind, _ in client.events(job, "lobes")][-1] == "end"
+
+
+@pytest.mark.slow
+def test_of_a_robot_as_a_job_they_are_the_same(client, store, tmp_path):
+    client.write_robot("arm", ROBOT)
+    arm, cut = {"robot": "arm", "posture_deg": [10.0, 40.0]}, {"ktc_mpa": 660.0, "krc": 0.38}
+    at_once = client.lobes(arm, example(), speeds=SPEEDS, cut=cut)
+    job = later(client, arm, example(), cut=cut)
+    # what it was asked of is what was there then
+    client.forget_robot("arm")
+    carried(store, tmp_path)
+    found = client.lobe_job(job)
+    assert (found.job.state, found.job.machine) == ("done", "")
+    assert found.answer == at_once
+    assert found.answer.machine == "arm"
 
 
 @pytest.mark.slow

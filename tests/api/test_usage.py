@@ -58,6 +58,7 @@ def filled(store, machine: str) -> None:
         store.toolings.put(document("T1", words))
     store.toolings.put(document("T2", "gone"))
     store.toolings.delete("A", "T2")
+    store.robots.put(document("R1", "z" * 2000))
     campaign = store.campaigns.add(Campaign(new_id(), "A", machine, "C", json.dumps({"toolings": "y" * 3000}), 1, now()), ("k", "d"))
     row = Recording("A", campaign.id, "c.h5", "cut", 1, "0" * 64, "1" * 64, '{"verdict": {"usable": true}}', "", now(), "2" * 64)
     store.recordings.put(row, False)

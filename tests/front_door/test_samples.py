@@ -32,7 +32,7 @@ def test_the_wheel_carries_what_a_checkout_has(tmp_path, monkeypatch):
     installed = tmp_path / target
     installed.mkdir(parents=True)
     (installed / "hpm.toml").touch()
-    monkeypatch.setattr(samples, "files", lambda package: tmp_path / package)
+    monkeypatch.setattr("rcsa_ident.sample_files.files", lambda package: tmp_path / package)
     assert samples.sample_data() == installed
     (installed / "hpm.toml").unlink()
     with pytest.raises(ri.InputError, match="sample data"):

@@ -19,6 +19,7 @@ def test_a_step_runs(name):
         "recordings": ("signals", "order_sums"),
         "listening": ("signals", "sideband_scores"),
         "lobes": ("stability", "envelopes"),
+        "robot": ("machine.robot", "mass_matrix"),
     }
     marched = [("stability._depth_kernels", kernel) for kernel in ("boundaries", "lowest", "first_of_ladder")]
     if name in called:

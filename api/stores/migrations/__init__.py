@@ -16,7 +16,7 @@ from rcsa_ident.errors import InputError
 #: What Alembic reads.
 SCRIPTS = Path(__file__).parent
 #: Number of the newest revision.
-SCHEMA_VERSION = 8
+SCHEMA_VERSION = 9
 #: Where Alembic keeps the number, as it makes the table itself.
 _kept = Table(
     "alembic_version", MetaData(), Column("version_num", String(32)), PrimaryKeyConstraint("version_num", name="alembic_version_pkc")

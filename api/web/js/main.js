@@ -37,6 +37,7 @@ route("toolings/new", "toolings", view("tooling"));
 route("toolings/edit/:name", "toolings", view("tooling"));
 route("toolings/ring/:name", "toolings", view("ring"));
 route("changes", "toolings", view("changes"));
+route("robots", "robots", view("robots"));
 route("change", "change", ofMachine(view("change")));
 route("card", "change", view("tool_card"));
 route("listen", "listen", view("listen"));
@@ -51,6 +52,7 @@ const SECTIONS = [
   ["identification", "Identification", "Identify", "identification"],
   ["toolings", "Toolings", "Tools", "toolings"],
   ["change", "Tool change", "Lobes", "change"],
+  ["robots", "Robots", "Robots", "robots"],
   ["forces", "Forces", "Forces", "forces"],
 ];
 

@@ -63,8 +63,8 @@ function wayBack(change, fault) {
 function restoreButton(change, fault) {
   const label = `Restore version ${change.version} of ${change.title}`;
   const button = h("button", { type: "button", class: "quiet small", "aria-label": label }, "Restore");
-  const tooling = change.kind === "tooling";
-  const thing = tooling ? `toolings/${part(change.name)}` : `machines/${part(change.name)}/identification`;
+  const tooling = change.kind !== "identification";
+  const thing = tooling ? `${change.kind}s/${part(change.name)}` : `machines/${part(change.name)}/identification`;
   const path = `${thing}/versions/${change.version}`;
   button.addEventListener(
     "click",
