@@ -38,7 +38,7 @@ HOUSING = Body(32.0, np.array([0.0, 0.0, -0.19]), np.diag([0.7, 0.7, 0.2]))
 #: Where tools work, upright: corners of a box for the tool-holder's flange [m].
 BOX = np.array([[0.9, -0.7, 0.2], [1.6, 0.7, 0.9]])
 #: Spindle speeds of the cuts at each posture [rev/min]: slow ones shake the arm, the last one the spindle.
-SPEEDS = (500.0, 900.0, 1700.0, 4000.0, 12000.0)
+SPEEDS = (500.0, 1100.0, 2400.0, 5300.0, 11600.0)
 #: Cut with, two teeth each; never cut with.
 CUT, NEVER_CUT = ("S1-ER32", "S2-PG25"), ("S3-PG25-long", "S4-shrink")
 TEETH = 2
