@@ -1,7 +1,7 @@
 """Virtual robots drawn by chance: springs, dampers and masses differ from the data sheet, a spindle of shaft and bearings is in the hand.
 
-The arm is that of ``data/robots/tx200.toml``, the spindle that of ``data/machines/hpm.toml`` in a lighter housing. The seeds of `EVALUATION`
-were fixed on 2026-11-25, after a fit to robot 1 and before any of them was drawn.
+The arm is that of ``data/robots/tx200.toml``, the spindle that of ``data/machines/hpm.toml`` in a lighter housing. The seeds of
+`EVALUATION` were fixed on 2026-11-25, after fits to robots 1 and 2 and before any of them was drawn.
 """
 
 from __future__ import annotations
@@ -113,9 +113,7 @@ def postures(count: int, seed: int) -> FloatArray:
 def campaign(folder: Path, robot: VirtualRobot, at: FloatArray, tools: dict[Path, Tooling], seed: int, map: Map = map) -> None:
     """Write a campaign: every tooling's cuts at every posture."""
     own = machine()
-    plan = CutPlan(
-        tuple(from_rpm(speed) for speed in SPEEDS), 0.2e-3, 0.1e-3, Engagement(0.5 * np.pi, np.pi), duration=3.0, settling=1.5
-    )
+    plan = CutPlan(tuple(from_rpm(speed) for speed in SPEEDS), 0.2e-3, 0.1e-3, Engagement(0.5 * np.pi, np.pi), duration=3.0, settling=1.5)
     sensors = replace(own.sensors, rate=12800.0, acceleration_noise=0.02)
     setup = RobotSetup(robot, at, sensors, own.workpiece, plan)
     write_robot_campaign(folder, "robot", setup, tools, simulate_robot(setup, list(tools.values()), seed, map))

@@ -18,10 +18,15 @@ from rcsa_ident.units import from_hz, inclusive, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.identification.posed.posterior import RobotPosterior
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
 
 RobotFile = Annotated[Path, typer.Argument(help="ROBOT.toml of an arm; three stand in data/robots.", show_default=False)]
+FoundRobot = Annotated[
+    Path,
+    typer.Argument(help="ROBOT.toml of an arm, three stand in data/robots; or RESULT.json, as cuts have told it.", show_default=False),
+]
 Posture = Annotated[
     str, typer.Option(metavar="'Q1 Q2 ...'", help="Angles of the joints, degrees, as ROBOT.toml counts them.", show_default=False)
 ]
@@ -36,7 +41,7 @@ robot_app = typer.Typer(
 
 @answers
 def check(
-    robot: RobotFile,
+    robot: FoundRobot,
     posture: Annotated[
         str | None,
         typer.Option(metavar="'Q1 Q2 ...'", help="Angles of the joints, degrees; default: all zero.", show_default=False),
@@ -82,7 +87,7 @@ def check(
 
 @answers
 def tip(
-    robot: RobotFile,
+    robot: FoundRobot,
     tooling: ToolingFile,
     posture: Posture,
     out: Annotated[Path, typer.Option(help="FRF.csv to write, m/N.", show_default=False)],
@@ -101,7 +106,7 @@ def tip(
 @answers
 @takes_groups
 def lobes(
-    robot: RobotFile,
+    robot: FoundRobot,
     tooling: ToolingFile,
     posture: Posture,
     out: Annotated[Path, typer.Option(help="LOBES.csv to write.", show_default=False)],
@@ -124,7 +129,7 @@ def lobes(
 @answers
 @takes_groups
 def map_(
-    robot: RobotFile,
+    robot: FoundRobot,
     tooling: ToolingFile,
     posture: Annotated[
         str,
@@ -187,12 +192,27 @@ def _arm(path: Path, joints_only: bool) -> FlexibleRobot:
     from rcsa_ident.io.robots import read_robot
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
 
-    return FlexibleRobot(read_robot(path), tilts=not joints_only)
+    found = _found(path, joints_only)
+    return FlexibleRobot(read_robot(path), tilts=not joints_only) if found is None else found.arm
+
+
+def _found(path: Path, joints_only: bool) -> RobotPosterior | None:
+    """What cuts have told of a robot, where the file is RESULT.json."""
+    if path.suffix.lower() != ".json":
+        return None
+    from rcsa_ident.io.robot_results import read_robot_result
+
+    if joints_only:
+        raise InputError("--joints-only", str(path), "ROBOT.toml: cuts have told all springs together")
+    return read_robot_result(path)
 
 
 def _posed(path: Path, posture: str, joints_only: bool) -> PosedRobot:
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
 
+    found = _found(path, joints_only)
+    if found is not None:
+        return found.at(_angles(posture, found.arm))
     arm = _arm(path, joints_only)
     return PosedRobot(arm, _angles(posture, arm))
 

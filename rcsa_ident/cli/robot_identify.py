@@ -1,4 +1,4 @@
-"""robot identify: the stiffness of an arm's joints from what was measured on it."""
+"""robot identify: the springs of an arm, and the spindle in its hand, from what was measured on it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.identify import read_and_judge
+from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.cli.robot import RobotFile
 from rcsa_ident.errors import InputError
 
@@ -20,12 +22,14 @@ def identify(
     records: Annotated[
         list[Path],
         typer.Argument(
-            help="Motions with both encoders and the motors' torques, RECORD.mat or RECORD.csv; or forces and how far they push the "
-            "standing arm, TESTS.csv. One or more.",
+            help="A campaign directory of cuts at several postures; or motions with both encoders and the motors' torques, RECORD.mat or "
+            "RECORD.csv; or forces and how far they push the standing arm, TESTS.csv. One or more of the latter two.",
             show_default=False,
         ),
     ],
-    out: Annotated[Path, typer.Option(help="ROBOT.toml to write, with the stiffnesses that were found.", show_default=False)],
+    out: Annotated[
+        Path, typer.Option(help="ROBOT.toml to write, with the stiffnesses that were found; from cuts RESULT.json.", show_default=False)
+    ],
     check: Annotated[
         list[Path] | None,
         typer.Option(
@@ -34,23 +38,67 @@ def identify(
             show_default=False,
         ),
     ] = None,
+    seed: Seed = 1,
+    processes: Processes = None,
+    dask: Dask = None,
     json_: Json = False,
 ) -> None:
-    """Find the stiffness of an arm's joints from encoders on both sides of the gears while it moves, or from static tests.
+    """Find the springs of an arm from stable cuts at a few postures, from encoders on both sides of its gears, or from static tests.
 
-    The file's stiffness is believed to its own size. A joint whose motions do not tell keeps it; tests tell the springs across the axes
-    and the play, too.
+    The file's stiffness is believed to about its own size. Cuts tell springs, dampers and the spindle in the hand: RESULT.json takes the
+    place of ROBOT.toml in `tip`, `lobes`, `map` and `check` then, at any posture, with bands. A joint whose motions do not tell keeps
+    the file's stiffness; static tests tell the springs across the axes and the play, too.
     """
     from rcsa_ident.io.robot_static import is_static
 
     writable(out)
     folders = [path for path in records if path.is_dir()]
     if folders:
-        raise InputError("records", str(folders[0]), "files of a moving arm: stiffness from cuts is not there yet")
+        if len(records) > 1:
+            raise InputError("records", f"{folders[0]} beside others", "one campaign directory alone")
+        if check:
+            raise InputError("--check", str(check[0]), "motions or static tests: cuts are checked against each other")
+        _from_cuts(robot, folders[0], out, seed, processes, dask, json_)
+        return
     static = [path for path in records if is_static(path)]
     if static and len(static) < len(records):
         raise InputError("records", f"{static[0].name} beside others", "motions alone, or static tests alone")
     (_from_tests if static else _from_encoders)(robot, records, out, check or [], json_)
+
+
+def _from_cuts(robot: Path, folder: Path, out: Path, seed: int, processes: int | None, dask: str | None, json_: bool) -> None:
+    """What stable cuts at several postures tell."""
+    from rcsa_ident.io.robot_results import robot_result_to_json, write_robot_result
+    from rcsa_ident.io.robots import read_robot
+    from rcsa_ident.machine.robot.flexible import FlexibleRobot
+    from rcsa_ident.workflows.identify import left_out
+    from rcsa_ident.workflows.identify_robot import identify_robot
+
+    arm, stages = FlexibleRobot(read_robot(robot)), Stages(quiet=json_)
+    with workers_or_cluster(processes, dask) as pool:
+        campaign, readings = read_and_judge(folder, pool, stages)
+        with stages.stage("identification") as line:
+            found = identify_robot(campaign, readings, arm, seed, pool.map, lambda stage, cost, _: line.tell("both", str(stage), cost))
+    unused = left_out(readings)
+    write_robot_result(out, found, campaign.name, unused)
+    if json_:
+        data = robot_result_to_json(found, campaign.name, unused)
+        kept = ("status", "reasons", "notes", "seed", "campaign", "band_hz", "misfit", "springs", "masses", "spindle")
+        emit({key: data[key] for key in kept} | {"seconds": stages.seconds, "result": str(out)})
+    else:
+        from rcsa_ident.cli.tables import show_identified_robot
+
+        show_identified_robot(found)
+        shares = " and ".join(f"{100.0 * share:.2g} %" for share in found.model_error)
+        say(f"{shares} of each line of X and of Y are left unexplained")
+        for id, reason in unused:
+            warn(f"{id} left out: {reason}")
+        for note in found.notes:
+            say(f"note: {note}")
+        say(", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items()))
+        say(f"written: {out}")
+    for reason in found.reasons:
+        warn(f"the result is suspect: {reason}")
 
 
 def _from_encoders(robot: Path, records: Sequence[Path], out: Path, check: Sequence[Path], json_: bool) -> None:

@@ -34,6 +34,7 @@ from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
 if TYPE_CHECKING:
+    from rcsa_ident.identification.posed.result import RobotIdentification
     from rcsa_ident.identification.robot_static import StaticFit
     from rcsa_ident.workflows.learn_from_cuts import NextTest
     from rcsa_ident.workflows.robot_postures import RobotAtPosture
@@ -434,6 +435,16 @@ def show_springs(names: Sequence[str], found: StaticFit) -> None:
     for i, name in enumerate(names):
         told = "yes" if found.told[i] else f"in sum {group[i]}" if i in group else "no"
         table.add_row(name, f"{1e-6 * chain.stiffness[i]:.3g}", f"{100.0 * found.share[i]:.0f}", told, *plays[i])
+    show(table)
+
+
+def show_identified_robot(found: RobotIdentification) -> None:
+    """Print what cuts told of an arm's springs and of the spindle in its hand."""
+    table = Table(title=str(found))
+    for name in ("spring", "stiffness [MN m/rad]", "± [%]", "told"):
+        table.add_column(name, justify="left" if name in ("spring", "told") else "right")
+    for name, stiffness, share, told in found.springs:
+        table.add_row(name, f"{1e-6 * stiffness:.4g}", f"{100.0 * share:.2g}", "yes" if told else "no")
     show(table)
 
 

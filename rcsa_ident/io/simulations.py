@@ -81,8 +81,8 @@ def write_simulation(
             raise InputError("out", str(folder), "a folder that does not exist or is empty")
     total = len(toolings) * len(setup.plan.cuts)
     with filling(out, "out") as runs, filling(truth, "out") as known:
-        for folder in ("tip", "cross", "forces"):
-            (known / folder).mkdir()
+        for place in ("tip", "cross", "forces"):
+            (known / place).mkdir()
         _write_head(runs, dict(zip(setup.toolings, toolings, strict=True)))
         write_text(runs / "campaign.toml", campaign_text(setup, toolings))
         rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
@@ -202,8 +202,8 @@ def write_robot_campaign(
 
 def _write_head(runs: Path, toolings: Mapping[Path, Tooling]) -> None:
     """Folders, and the toolings' files."""
-    for folder in ("recordings", "toolings"):
-        (runs / folder).mkdir()
+    for part in ("recordings", "toolings"):
+        (runs / part).mkdir()
     for path, tooling in toolings.items():
         # where the schema for editors lies is another way from there
         text = path.read_text("utf-8-sig")

@@ -10,7 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.force import axial_and_slope
-from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.model_order import Report
@@ -79,7 +79,7 @@ class _Beside:
     data: IdentificationData
 
     @cached_property
-    def _poles(self) -> dict[str, tuple[PoleResidue, PoleResidue]]:
+    def _poles(self) -> dict[str, tuple[PoleModel, PoleModel]]:
         highest = max(float(axis.omega.max()) for axis in self.data.axes)
         assemblies = {name: self.campaign.toolings[name].assembly for name in self.data.toolings}
         return {name: (rod_poles(each, highest), rod_poles(each, highest, twisting=True)) for name, each in assemblies.items()}

@@ -111,10 +111,10 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
                 seen[i, a] = shapes[i, a]
             seen[i, 6], seen[i, 7] = shapes[i, 0], shapes[i, 2]
             for j in range(m):
-                total = 0.0
+                pulled = 0.0
                 for d in range(4):
-                    total += shapes[i, d] * pull[j, d]
-                dynamic[i, n + j] = dynamic[n + j, i] = complex(-w * w * total, 0.0)
+                    pulled += shapes[i, d] * pull[j, d]
+                dynamic[i, n + j] = dynamic[n + j, i] = complex(-w * w * pulled, 0.0)
         for i in range(m):
             for j in range(m):
                 dynamic[n + i, n + j] = complex(omega_n[i] ** 2 - w * w if i == j else 0.0, w * damping[i, j])

@@ -118,7 +118,7 @@ class SpindleStart:
 
     def run(self) -> Candidate:
         """Refine from coarse to fine."""
-        point = with_spindle(self.arm, self.numbers)
+        point: tuple[FloatArray, Unknowns, FloatArray] = with_spindle(self.arm, self.numbers)
         for share in SPINDLE_SHARES:
             misfit = PosedMisfit(self.data, self.priors, (share, share))
             found = refine(misfit, *point, _FEW_STEPS, grid=32 if share >= GRID else 0, tolerance=_ROUGHLY)
@@ -191,7 +191,7 @@ def _spindle(
     costs = np.concatenate(finite(map(perform, tasks)))
     starts = [SpindleStart(data, priors, arm, numbers[k]) for k in np.argsort(costs, kind="stable")[:POLISHED]]
     best = min(finite(map(perform, starts)), key=lambda each: each.cost)
-    point, weight, shares = best.point, np.ones(len(data.base.cut_ids)), (SPINDLE_SHARES[-1], SPINDLE_SHARES[-1])
+    point, weight, shares = best.point, np.ones(len(data.base.cut_ids)), (SPINDLE_SHARES[-1],) * len(data.base.axes)
     for _ in range(2):
         found, misfit = _learned(data, priors, point, shares, weight, report, _ROUGHLY)
         found = _grown(found, misfit, data, report)

@@ -91,6 +91,11 @@ class RobotPosterior:
         if self.covariance.shape != (self.best.theta.size,) * 2:
             raise InputError("covariance", self.covariance.shape, f"a square matrix for {self.best.theta.size} unknowns")
 
+    @property
+    def arm(self) -> FlexibleRobot:
+        """The arm with its most probable springs."""
+        return self.best.arm(self.sheet, self.tilts)
+
     def at(self, posture: FloatArray, turn: float = 0.0, unknowns: RobotUnknowns | None = None) -> PosedRobot:
         """Return the robot at a posture [rad], its feed turned from the tool's x [rad]; of other unknowns than the best ones if told."""
         chosen = self.best if unknowns is None else unknowns

@@ -170,5 +170,5 @@ def check_postures(postures: Sequence[tuple[float, ...]], ids: Sequence[str], ro
             found = f"{len(posture)} angles of cut {id}" if posture else f"nothing of cut {id}"
             raise InputError("posture_deg", found, f"{len(robot.joints)} angles, one a joint [°], of every cut")
     # a control tells its angles to a ten-thousandth of a degree
-    found, of_cut = np.unique(np.round(np.degrees(np.array(postures)), 4), axis=0, return_inverse=True)
-    return np.radians(found), of_cut.ravel()
+    every, of_cut = np.unique(np.round(np.degrees(np.array(postures)), 4), axis=0, return_inverse=True)
+    return np.radians(every), of_cut.ravel()
