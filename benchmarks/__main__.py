@@ -57,6 +57,7 @@ STUDIES = (
     "ring",
     "workpiece_side",
     "corner_radius",
+    "robot_cuts",
 )
 
 

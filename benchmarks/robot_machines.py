@@ -15,7 +15,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import MachineFile, read_machine
+from rcsa_ident.io.machines import MachineFile, RobotSetup, read_machine
 from rcsa_ident.io.robots import read_robot
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.simulations import write_robot_campaign
@@ -25,7 +25,7 @@ from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.scaleout import Map
 from rcsa_ident.units import from_rpm
 from rcsa_ident.virtual.machine import CutPlan
-from rcsa_ident.virtual.robot import RobotSetup, VirtualRobot
+from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.workflows.simulate import simulate_robot
 
 DATA = Path(__file__).parents[1] / "data"

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.io.cuts import feed_angle_of
 from rcsa_ident.io.setups import beam_segments, material_library
@@ -21,6 +22,7 @@ from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, 
 from rcsa_ident.units import from_hz, from_rpm, to_rpm
 from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
+from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.virtual.sensors import UNDISTURBED, SensorSuite
 from rcsa_ident.virtual.workpiece_side import ROLES, SideMode, VirtualWorkpieceSide
 
@@ -73,6 +75,39 @@ class MachineFile:
     truth_toolings: tuple[Path, ...] = ()
     disturbances: Disturbances = UNDISTURBED
     workpiece_side: VirtualWorkpieceSide | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotSetup:
+    """A virtual robot with the sensors of a virtual machine, what it cuts at each of some postures, and how.
+
+    Parameters
+    ----------
+    robot : VirtualRobot
+    postures : array, shape (c, j) [rad]
+    sensors : SensorSuite
+    workpiece : Workpiece
+    plan : CutPlan
+        Of the cuts of each tooling at each posture; the feed is told in the spindle's X-Y plane.
+    disturbances : Disturbances
+    """
+
+    robot: VirtualRobot
+    postures: FloatArray
+    sensors: SensorSuite
+    workpiece: Workpiece
+    plan: CutPlan
+    disturbances: Disturbances = UNDISTURBED
+
+    @property
+    def spindle(self) -> VirtualSpindle:
+        """The spindle in its hand."""
+        return self.robot.spindle
+
+    @property
+    def workpiece_side(self) -> None:
+        """Nothing else gives way."""
+        return
 
 
 def read_machine(path: str | Path) -> MachineFile:

@@ -16,14 +16,14 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.cuts import cut_keys
 from rcsa_ident.io.files import filling, write_text
 from rcsa_ident.io.hdf5 import write_hdf5
-from rcsa_ident.io.machines import MachineFile
+from rcsa_ident.io.machines import MachineFile, RobotSetup
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.units import from_hz, to_rpm
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
 from rcsa_ident.virtual.machine import CutPlan
-from rcsa_ident.virtual.robot import RobotSetup, robot_cut_id
+from rcsa_ident.virtual.robot import robot_cut_id
 from rcsa_ident.virtual.sensors import accelerometer_places
 
 Progress = Callable[[int, int], None]

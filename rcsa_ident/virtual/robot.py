@@ -14,12 +14,9 @@ import scipy.sparse
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.machine.robot.model import Body, Frame, RobotModel
-from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
-from rcsa_ident.virtual.disturbances import Disturbances
-from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
+from rcsa_ident.virtual.machine import VirtualSpindle
 from rcsa_ident.virtual.rotor import Rotor, rotor, turned
-from rcsa_ident.virtual.sensors import UNDISTURBED, SensorSuite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,39 +40,6 @@ class VirtualRobot:
         shaft = _along(self.spindle.shaft).seen_from(self.arm.tool_point)
         payload = shaft if self.arm.payload is None else self.arm.payload.beside(shaft)
         return replace(self.arm, payload=payload)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RobotSetup:
-    """A virtual robot with the sensors of a virtual machine, what it cuts at each of some postures, and how.
-
-    Parameters
-    ----------
-    robot : VirtualRobot
-    postures : array, shape (c, j) [rad]
-    sensors : SensorSuite
-    workpiece : Workpiece
-    plan : CutPlan
-        Of the cuts of each tooling at each posture; the feed is told in the spindle's X-Y plane.
-    disturbances : Disturbances
-    """
-
-    robot: VirtualRobot
-    postures: FloatArray
-    sensors: SensorSuite
-    workpiece: Workpiece
-    plan: CutPlan
-    disturbances: Disturbances = UNDISTURBED
-
-    @property
-    def spindle(self) -> VirtualSpindle:
-        """The spindle in its hand."""
-        return self.robot.spindle
-
-    @property
-    def workpiece_side(self) -> None:
-        """Nothing else gives way."""
-        return
 
 
 def robot_cut_id(tooling: str, posture: int, name: str) -> str:

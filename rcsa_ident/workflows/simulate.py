@@ -17,7 +17,7 @@ from rcsa_ident.virtual.disturbances import Disturbances, turning
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
 from rcsa_ident.virtual.milling import Course, CutHistory, mill_cut, synchronous_lines
 from rcsa_ident.virtual.reduction import Poles, ReducedRotor, alike, poles, reduced
-from rcsa_ident.virtual.robot import RobotSetup, VirtualRobot, robot_cut_id, robot_rotor
+from rcsa_ident.virtual.robot import VirtualRobot, robot_cut_id, robot_rotor
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.virtual.sensors import Clamping, SensorSuite, accelerometer_places, clamp, padding, record
 from rcsa_ident.virtual.workpiece_side import VirtualWorkpieceSide
@@ -54,6 +54,16 @@ class VirtualSetup(Protocol):
     def workpiece_side(self) -> VirtualWorkpieceSide | None: ...
 
 
+class VirtualRobotSetup(VirtualSetup, Protocol):
+    """The same of a virtual robot, which makes the cuts of its plan at each of some postures."""
+
+    @property
+    def robot(self) -> VirtualRobot: ...
+
+    @property
+    def postures(self) -> FloatArray: ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Job:
     """One pair of records, cut and air, with its own share of chance."""
@@ -83,12 +93,12 @@ def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: M
     yield from map(_Worker(setup), list(_jobs(setup, toolings, np.random.default_rng(seed))))
 
 
-def simulate_robot(setup: RobotSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
+def simulate_robot(setup: VirtualRobotSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
     """Yield every tooling's cut at every posture and speed of the plan, in order.
 
     Parameters
     ----------
-    setup : RobotSetup
+    setup : VirtualRobotSetup
     toolings : sequence of Tooling
     seed : int
         Same seed, same records.

@@ -199,4 +199,4 @@ def test_identify_from_encoders(tmp_path):
     assert "after the motors'" in words.output
     refused = run("robot", "identify", ROBOTS / "kr210.toml", tmp_path, "--out", tmp_path / "no.toml")
     assert refused.exit_code == 2
-    assert "stiffness from cuts is not there yet" in refused.output
+    assert "campaign.toml" in refused.output

@@ -165,6 +165,19 @@ def test_chatter(good, hertz):
     assert reasons(good, cut=shake(0.02)) == ""
 
 
+def test_chatter_of_a_spindle_that_swings_with_its_housing(good):
+    """A displacement sensor that stands on the housing does not see it; the accelerometer beside it does."""
+    t, hertz = np.arange(7168) / RATE, 860.0
+    largest = max(np.abs(a.receptance * a.force).max() for a in good.measure().measurement.axes.values())
+    felt = [k for k, sensor in enumerate(good.cut.sensors) if sensor.quantity is Quantity.ACCELERATION]
+    assert felt
+
+    def swing(x):
+        x[:, felt] -= 0.7 * largest * (2.0 * np.pi * hertz) ** 2 * np.sin(2.0 * np.pi * hertz * t)[:, None]
+
+    assert reasons(good, cut=changed(good.cut, swing)).startswith("chatter: ")
+
+
 def test_no_cutting(good):
     idle = pair(seed=3, force=0.0)
     assert "no cutting" in reasons(idle)

@@ -9,10 +9,10 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import whiten
+from rcsa_ident.identification.coupled._kernels import ArmArrays, LineArrays, PosedPoints, SpindleArrays, posed_lines
 from rcsa_ident.identification.coupled.misfit import compliance_of
 from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines
 from rcsa_ident.identification.parameters import JOINT, Unknowns, scaled_joint
-from rcsa_ident.identification.posed._kernels import ArmArrays, LineArrays, PointArrays, SpindleArrays, posed_lines
 from rcsa_ident.identification.posed.data import PosedData
 from rcsa_ident.identification.posed.parameters import DIRECTIONS, PosedLayout, chain, unpack
 from rcsa_ident.identification.posed.priors import ArmPriors, posed_prior_rows
@@ -58,7 +58,7 @@ class PosedMisfit(Misfit):
         posed_lines(
             ArmArrays(np.einsum("b,cbij->cij", robot.heavier, data.mass), data.bodies, data.shapes, robot.stiffness, robot.damping),
             SpindleArrays(spindle.omega_n, spindle.psi, spindle.pull, spindle.factor, spindle.residual, joint),
-            PointArrays(data.omega, data.posture, data.place, data.flange, data.tip, force),
+            PosedPoints(data.omega, data.posture, data.place, data.flange, data.tip, force),
             *lines,
         )
         scale, answers = np.concatenate([chain(robot, theta, layout), joint]), []

@@ -19,7 +19,7 @@ DRIVE, TILT, DAMPER = 0.6, 0.8, 1.0
 PULL = 2.0
 #: Standard deviations of the logarithms of a link's mass and of the payload's, which somebody has weighed.
 MASS, PAYLOAD = 0.05, 0.02
-#: Damping over the root of the stiffness [sqrt(N m) s] where a data sheet has none: that of the arm of [huynh2020].
+#: Damping over the root of the stiffness [sqrt(N m) s] where a data sheet has none: that of the arm of [huynh2018].
 _USUAL_DAMPING = 0.269
 
 

@@ -9,7 +9,16 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
-from rcsa_ident.identification.coupled._kernels import LineArrays, MachineArrays, PointArrays, coupled_lines
+from rcsa_ident.identification.coupled._kernels import (
+    ArmArrays,
+    LineArrays,
+    MachineArrays,
+    PointArrays,
+    PosedPoints,
+    SpindleArrays,
+    coupled_lines,
+    posed_lines,
+)
 from rcsa_ident.identification.coupled.parameters import (
     EVERY_PAIR,
     CoupledLayout,
@@ -261,3 +270,73 @@ def test_lines_are_those_of_a_turning_tool_holder_on_turning_modes(sense):
     for i, lines in enumerate(fill(unpack(theta, layout), scaled_joint(joint), at, 1)):
         expected = whole[:, 2 * i, [0, 2]] * force
         np.testing.assert_allclose(lines.parts[:, 0], expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
+
+
+def posed(seed=4, freedoms=5, modes=3, postures=2, bodies=2, count=4):
+    """An arm, a spindle and points of random numbers, of a real robot's size."""
+    rng = np.random.default_rng(seed)
+    roots = rng.standard_normal((postures, bodies, 6, freedoms)) * 3.0
+    mass = np.einsum("cbki,cbkj->cij", roots, roots) + np.eye(freedoms)
+    arm = ArmArrays(
+        mass, roots, rng.standard_normal((postures, freedoms, 6)), rng.uniform(1e5, 5e6, freedoms), rng.uniform(1e2, 1e3, freedoms)
+    )
+    factor = np.tril(rng.standard_normal((modes, modes))) + 8.0 * np.eye(modes)
+    spindle = SpindleArrays(
+        2.0 * np.pi * rng.uniform(500.0, 3000.0, modes),
+        0.3 * rng.standard_normal((modes, 4)),
+        0.3 * rng.standard_normal((modes, 4)),
+        factor,
+        3e-5 * np.tril(rng.standard_normal((4, 4))),
+        np.array([2e9, 5e8, 1e3, 1e2]),
+    )
+    flange = 1e-8 * (rng.standard_normal((count, 6, 6)) + 1j * rng.standard_normal((count, 6, 6)))
+    tip = 1e-8 * (rng.standard_normal((count, 6, 3)) + 1j * rng.standard_normal((count, 6, 3)))
+    force = 100.0 * (rng.standard_normal((count, 3)) + 1j * rng.standard_normal((count, 3)))
+    place = np.stack([[2, 0, 1, -1], [-1, 1, 0, 2]], axis=1).astype(np.intp)
+    omega = 2.0 * np.pi * rng.uniform(10.0, 900.0, count)
+    return arm, spindle, PosedPoints(omega, np.arange(count) % postures, place, flange, tip, force)
+
+
+def room_of(outputs, columns, rows=3):
+    shapes = (rows, outputs, 3), (rows, outputs, columns), (rows, outputs, 4), (rows, 4)
+    return LineArrays(*(np.full(shape, np.nan, dtype=complex) for shape in shapes))
+
+
+def posed_dense(arm, spindle, points, outputs):
+    """The same by one system of all freedoms at a time, nothing eliminated: arm, spindle, and what the joint's force does to both sides."""
+    found = np.full((2, 3, outputs, 3), np.nan, dtype=complex)
+    n, m = arm.stiffness.size, spindle.omega_n.size
+    for f, w in enumerate(points.omega):
+        hand = arm.shapes[points.posture[f]]
+        across = hand[:, :4] @ spindle.pull.T
+        mass = np.block([[arm.mass[points.posture[f]], across], [across.T, np.eye(m)]])
+        damping = np.zeros((n + m, n + m))
+        damping[:n, :n], damping[n:, n:] = np.diag(arm.damping), spindle.factor @ spindle.factor.T
+        stiffness = np.diag(np.concatenate([arm.stiffness, spindle.omega_n**2]))
+        moves = np.vstack([hand, np.pad(spindle.psi, ((0, 0), (0, 2)))])
+        gives = np.zeros((6, 6), dtype=complex)
+        gives[:4, :4] = spindle.residual @ spindle.residual.T
+        both = points.flange[f] + gives
+        k_t, k_r, c_t, c_r = spindle.joint
+        both += np.diag(np.tile([1.0 / (k_t + 1j * w * c_t), 1.0 / (k_r + 1j * w * c_r)], 3))
+        # freedoms and the six forces through the joint
+        whole = np.block([[stiffness - w**2 * mass + 1j * w * damping, -moves], [moves.T, both]])
+        right = np.vstack([np.zeros((n + m, 3)), points.tip[f] * points.force[f]])
+        answer = np.linalg.solve(whole, right)
+        flange = moves.T @ answer[: n + m] + gives @ answer[n + m :]
+        fixture = hand.T @ answer[:n]
+        for axis in range(2):
+            if points.place[f, axis] >= 0:
+                own = [flange[2 * axis]] if outputs == 1 else [flange[2 * axis] - fixture[2 * axis], fixture[2 * axis]]
+                found[axis, points.place[f, axis]] = own
+    return found
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_a_robots_lines_are_those_of_one_system(outputs):
+    arm, spindle, points = posed()
+    lines = [room_of(outputs, 60) for _ in range(2)]
+    posed_lines(arm, spindle, points, *lines)
+    expected = posed_dense(arm, spindle, points, outputs)
+    for found, other in zip(lines, expected, strict=True):
+        np.testing.assert_allclose(found.parts, other, rtol=1e-8, atol=1e-12 * np.abs(other).max())

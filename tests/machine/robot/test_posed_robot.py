@@ -11,10 +11,9 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.mode_synthesis import FLANGE
+from rcsa_ident.machine.robot.carried_spindle import CarriedSpindle
 from rcsa_ident.machine.robot.compliance import static_compliance
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.kinematics import tool_point_at
@@ -118,22 +117,52 @@ def test_where_nothing_moves_the_tip_gives_way_as_springs_do(arm, machine, tooli
     assert 0.0 < rest[2, 2] < 0.1 * rest[0, 0]
 
 
-def test_the_spindles_own_modes_add_to_the_arms(arm, tooling):
-    own = TurningModes(
+def spindle():
+    return CarriedSpindle(
         np.array([6000.0, 6500.0]),
         np.diag([300.0, 320.0]),
-        np.zeros((2, 2)),
-        np.array([[0.3, 1.0, 0.0, 0.0], [0.0, 0.0, 0.3, 1.0]]),
+        np.array([[0.5, 1.0, 0.0, 0.0], [0.0, 0.0, 0.5, 1.0]]),
+        np.array([[0.6, 0.05, 0.0, 0.0], [0.0, 0.0, 0.6, 0.05]]),
         np.diag([1e-9, 1e-8, 1e-9, 1e-8]),
-        0.0,
-        FLANGE,
     )
-    with_spindle, rigid = (PosedRobot(arm, TABLE_7, spindle=each, joint=JOINT) for each in (own, None))
-    difference = with_spindle.receptance(OMEGA).values - rigid.receptance(OMEGA).values
-    np.testing.assert_allclose(difference[:, :4, :4], own.receptance(OMEGA).values, atol=1e-9 * np.abs(difference).max())
-    assert np.max(np.abs(difference[:, 4:])) < 1e-9 * np.max(np.abs(difference))
-    with pytest.raises(InputError, match="spindle"):
-        PosedRobot(arm, TABLE_7, spindle=replace(own, coordinates=FLANGE[::-1]))
+
+
+def test_the_hand_pulls_the_spindle_and_the_spindle_the_hand(arm, tooling):
+    """Arm and spindle as substructures: the modes on their held housing push the hand with what they leave of their own inertia."""
+    own, omega = spindle(), OMEGA
+    found = PosedRobot(arm, TABLE_7, spindle=own, joint=JOINT).receptance(omega).values
+    structure = arm.at(TABLE_7)
+    hand = structure.ports
+    for k, w in enumerate(omega):
+        held = np.linalg.inv(np.diag(own.omega_n**2 - w**2 + 0j) + 1j * w * own.damping)
+        pull = np.pad(own.pull, ((0, 0), (0, 2)))
+        psi = np.pad(own.psi, ((0, 0), (0, 2)))
+        # the hand moves by u: modes answer w^2 P u + Psi f, and pull back with w^2 P^T times their motion
+        felt = structure.stiffness - w**2 * structure.mass + 1j * w * structure.damping - w**4 * hand @ pull.T @ held @ pull @ hand.T
+        moved = np.linalg.solve(felt, hand @ (np.eye(6) + w**2 * pull.T @ held @ psi))
+        flange = hand.T @ moved + psi.T @ held @ (w**2 * pull @ hand.T @ moved + psi)
+        flange[:4, :4] += own.residual
+        np.testing.assert_allclose(found[k], flange, atol=1e-9 * np.abs(flange).max())
+
+
+def test_a_feed_that_is_turned_turns_the_spindle_too(arm):
+    turn = 0.7
+    straight, turned = (
+        PosedRobot(arm, TABLE_7, turn=each, spindle=spindle(), joint=JOINT).receptance(OMEGA).values for each in (0.0, turn)
+    )
+    c, s = np.cos(turn), np.sin(turn)
+    into = np.zeros((6, 6))
+    into[:4, :4] = np.kron([[c, -s], [s, c]], np.eye(2))
+    into[4:, 4:] = np.eye(2)
+    np.testing.assert_allclose(turned, into @ straight @ into.T, atol=1e-9 * np.abs(straight).max())
+
+
+def test_a_spindle_heavier_than_the_payload_is_refused(arm):
+    heavy = replace(spindle(), pull=10.0 * spindle().pull)
+    with pytest.raises(InputError, match="swing 36 kg in X"):
+        _ = PosedRobot(arm, TABLE_7, spindle=heavy, joint=JOINT).flange
+    with pytest.raises(InputError, match="spindle psi"):
+        replace(spindle(), psi=np.zeros((3, 4)))
 
 
 def test_lines_are_close_around_the_arms_modes(machine):
