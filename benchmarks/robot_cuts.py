@@ -1,9 +1,10 @@
 """Robots from cuts at six postures, beside a Gaussian process over hammer tests at fifty, in one run.
 
 ``python -m benchmarks robot_cuts --seeds 11 12 13``: each virtual robot (`robot_machines`) makes ten cuts at each of six postures, five
-speeds with two toolings, and is identified from them and its data sheet. The peer is given what published work gives it: the tip's receptance
-of the same tooling from hammer tests at fifty postures, one per cent of noise on every line, from which a Gaussian process interpolates real
-and imaginary part over the joints' angles, length scales by marginal likelihood. Both are asked at twenty postures that nobody tested.
+speeds with two toolings, and is identified from them and its data sheet. The peer is given what published work gives it: the tip's
+receptance of the same tooling from hammer tests at fifty postures, one per cent of noise on every line, from which a Gaussian process
+interpolates real and imaginary part over the joints' angles; length scales and noise maximise the marginal likelihood of all lines together.
+Both are asked at twenty postures that nobody tested.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import argparse
 import json
 import tempfile
 import time
-import warnings
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -20,6 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.linalg
+import scipy.optimize
 
 from benchmarks.robot_machines import CUT, EVALUATION, NEVER_CUT, campaign, drawn, known, postures, toolings
 from rcsa_ident.arrays import ComplexArray, FloatArray
@@ -84,23 +86,45 @@ def study(seed: int, scratch: Path) -> dict[str, Any]:
 
 def interpolated(robot: VirtualRobot, tooling: Tooling, hit: FloatArray, asked: FloatArray, seed: int) -> list[ComplexArray]:
     """Return the tips that a Gaussian process interpolates from hammer tests, shape (n, 2, 2) each."""
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-
     rng, omega = np.random.default_rng(400 + seed), from_hz(np.concatenate([LOW, HIGH]))
     tests = np.array([true_robot_tip(robot, q, tooling, omega)[:, :2, :2] for q in hit])
     tests = tests * (1.0 + NOISE * (rng.standard_normal(tests.shape) + 1j * rng.standard_normal(tests.shape)) / np.sqrt(2.0))
     values = np.concatenate([tests.real, tests.imag], axis=1).reshape(len(hit), -1)
     # every line by its own size, so that all count alike
     middle, size = values.mean(axis=0), values.std(axis=0) + 1e-300
-    kernel = ConstantKernel(1.0) * RBF(np.ones(hit.shape[1]), (0.1, 100.0)) + WhiteKernel(1e-2, (1e-6, 1.0))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        process = GaussianProcessRegressor(kernel, n_restarts_optimizer=2, random_state=0).fit(hit, (values - middle) / size)
-        answers = process.predict(asked) * size + middle
+    answers = _gaussian_process(hit, (values - middle) / size, asked) * size + middle
     parts = answers.reshape(len(asked), 2, omega.size, 2, 2)
     return [each[0] + 1j * each[1] for each in parts]
+
+
+def _gaussian_process(known: FloatArray, values: FloatArray, asked: FloatArray) -> FloatArray:
+    """Return what a Gaussian process expects: squared exponential, a length scale for each input, white noise; best of three starts.
+
+    Parameters
+    ----------
+    known : array, shape (k, j)
+    values : array, shape (k, f)
+        Of unit variance.
+    asked : array, shape (a, j)
+    """
+    k, columns = values.shape
+    gram = values @ values.T
+
+    def covariance(a: FloatArray, b: FloatArray, logs: FloatArray) -> FloatArray:
+        apart = (a[:, None] - b[None, :]) / np.exp(logs[:-2])
+        found: FloatArray = np.exp(2.0 * logs[-2] - 0.5 * np.sum(apart**2, axis=2))
+        return found
+
+    def cost(logs: FloatArray) -> float:
+        factor = np.linalg.cholesky(covariance(known, known, logs) + np.exp(2.0 * logs[-1]) * np.eye(k))
+        return float(0.5 * np.trace(scipy.linalg.cho_solve((factor, True), gram)) + columns * np.sum(np.log(np.diag(factor))))
+
+    bounds = [(np.log(0.05), np.log(50.0))] * known.shape[1] + [(np.log(0.1), np.log(10.0)), (np.log(1e-3), 0.0)]
+    starts = (np.append(np.full(known.shape[1], np.log(length)), [0.0, np.log(0.1)]) for length in (0.3, 1.0, 3.0))
+    best = min((scipy.optimize.minimize(cost, start, bounds=bounds) for start in starts), key=lambda each: each.fun).x
+    weights = np.linalg.solve(covariance(known, known, best) + np.exp(2.0 * best[-1]) * np.eye(k), values)
+    found: FloatArray = covariance(asked, known, best) @ weights
+    return found
 
 
 def _tip(machine: PosedRobot, tooling: Tooling) -> ComplexArray:
