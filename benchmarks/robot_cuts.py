@@ -3,7 +3,7 @@
 ``python -m benchmarks robot_cuts --seeds 11 12 13``: each virtual robot (`robot_machines`) makes ten cuts at each of six postures, five
 speeds with two toolings, and is identified from them and its data sheet. The peer is given what published work gives it: the tip's
 receptance of the same tooling from hammer tests at fifty postures, one per cent of noise on every line, from which a Gaussian process
-interpolates real and imaginary part over the joints' angles; length scales and noise maximise the marginal likelihood of all lines together.
+interpolates real and imaginary part over the joints' angles; length scales and noise maximise the marginal likelihood of all lines.
 Both are asked at twenty postures that nobody tested.
 """
 
