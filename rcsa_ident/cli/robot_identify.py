@@ -28,7 +28,11 @@ def identify(
         ),
     ],
     out: Annotated[
-        Path, typer.Option(help="ROBOT.toml to write, with the stiffnesses that were found; from cuts RESULT.json.", show_default=False)
+        Path,
+        typer.Option(
+            help="ROBOT.toml to write, with what was found; from cuts RESULT.json, or ROBOT.toml without the spindle's modes.",
+            show_default=False,
+        ),
     ],
     check: Annotated[
         list[Path] | None,
@@ -68,8 +72,10 @@ def identify(
 
 def _from_cuts(robot: Path, folder: Path, out: Path, seed: int, processes: int | None, dask: str | None, json_: bool) -> None:
     """What stable cuts at several postures tell."""
+    from rcsa_ident.io.files import write_text
     from rcsa_ident.io.robot_results import robot_result_to_json, write_robot_result
-    from rcsa_ident.io.robots import read_robot
+    from rcsa_ident.io.robots import read_robot, robot_keys
+    from rcsa_ident.io.toml_text import toml_of
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.workflows.identify import left_out
     from rcsa_ident.workflows.identify_robot import identify_robot
@@ -80,7 +86,12 @@ def _from_cuts(robot: Path, folder: Path, out: Path, seed: int, processes: int |
         with stages.stage("identification") as line:
             found = identify_robot(campaign, readings, arm, seed, pool.map, lambda stage, cost, _: line.tell("both", str(stage), cost))
     unused = left_out(readings)
-    write_robot_result(out, found, campaign.name, unused)
+    if out.suffix.lower() == ".toml":
+        write_text(
+            out, toml_of(robot_keys(found.posterior.arm.model), [f"springs, dampers and masses from cuts of {campaign.name}"], digits=6)
+        )
+    else:
+        write_robot_result(out, found, campaign.name, unused)
     if json_:
         data = robot_result_to_json(found, campaign.name, unused)
         kept = ("status", "reasons", "notes", "seed", "campaign", "band_hz", "misfit", "springs", "masses", "spindle")

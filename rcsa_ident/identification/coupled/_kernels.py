@@ -150,6 +150,33 @@ def solve_transposed(factors, right):
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _through(factor, p, q, lp, lq):
+    """Write L^T p and L^T q of a lower triangular L into `lp` and `lq`."""
+    m = factor.shape[0]
+    for j in range(m):
+        sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
+        for i in range(j, m):
+            sum_p += factor[i, j] * p[i]
+            sum_q += factor[i, j] * q[i]
+        lp[j], lq[j] = sum_p, sum_q
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _lower(row, k, scale, ends, through):
+    """Write the change of scale p^T L L^T q with the lower triangle of L by rows into `row` from k on; return where it ends.
+
+    ends: p and q; through: L^T p and L^T q.
+    """
+    p, q = ends
+    lp, lq = through
+    for i in range(p.size):
+        for j in range(i + 1):
+            row[k] = scale * (p[i] * lq[j] + lp[j] * q[i])
+            k += 1
+    return k
+
+
+@numba.njit(cache=True, error_model="numpy")
 def coupled_lines(machine, points, lines_x, lines_y):
     """Fill the lines of both axes: displacement of flange, or of gap and fixture, per force in X and in Y, and its gradient.
 
@@ -261,12 +288,7 @@ def coupled_lines(machine, points, lines_x, lines_y):
                     if outputs == 2:
                         total += fixture * back[i, 4 + axis]
                     p[i] = total
-                for j in range(m):
-                    sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
-                    for i in range(j, m):
-                        sum_p += factor[i, j] * p[i]
-                        sum_q += factor[i, j] * q[i]
-                    lp[j], lq[j] = sum_p, sum_q
+                _through(factor, p, q, lp, lq)
                 for i in range(m):
                     sum_p, sum_q = stiffness[i, i] * p[i], stiffness[i, i] * q[i]
                     if soft:
@@ -275,12 +297,7 @@ def coupled_lines(machine, points, lines_x, lines_y):
                             sum_p += stiffness[i, j] * p[j]
                             sum_q += stiffness[i, j] * q[j]
                     kp[i], kq[i] = sum_p, sum_q
-                for j in range(4):
-                    sum_x, sum_v = complex(0.0, 0.0), complex(0.0, 0.0)
-                    for i in range(j, 4):
-                        sum_x += residual[i, j] * x[i]
-                        sum_v += residual[i, j] * v[i]
-                    rx[j], rv[j] = sum_x, sum_v
+                _through(residual, v, x, rv, rx)
                 row = gradient[row_number, o]
                 k = m
                 for i in range(m):
@@ -288,15 +305,8 @@ def coupled_lines(machine, points, lines_x, lines_y):
                     for c in range(4):
                         row[k] = v[c] * q[i] + p[i] * x[c]
                         k += 1
-                turn = complex(0.0, -w)
-                for i in range(m):
-                    for j in range(i + 1):
-                        row[k] = turn * (p[i] * lq[j] + lp[j] * q[i])
-                        k += 1
-                for i in range(4):
-                    for j in range(i + 1):
-                        row[k] = v[i] * rx[j] + rv[j] * x[i]
-                        k += 1
+                k = _lower(row, k, complex(0.0, -w), (p, q), (lp, lq))
+                k = _lower(row, k, complex(1.0, 0.0), (v[:4], x[:4]), (rv, rx))
                 if outputs == 2:
                     for i in range(m):
                         row[k + axis] = fixture * q[i]
@@ -453,18 +463,8 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
                         sum_p += shapes[i, d] * p[i]
                         sum_q += shapes[i, d] * q[i]
                     hp[d], hq[d] = w * w * sum_p, w * w * sum_q
-                for j in range(m):
-                    sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
-                    for i in range(j, m):
-                        sum_p += factor[i, j] * p[n + i]
-                        sum_q += factor[i, j] * q[n + i]
-                    lp[j], lq[j] = sum_p, sum_q
-                for j in range(4):
-                    sum_x, sum_v = complex(0.0, 0.0), complex(0.0, 0.0)
-                    for i in range(j, 4):
-                        sum_x += residual[i, j] * x[i]
-                        sum_v += residual[i, j] * v[i]
-                    rx[j], rv[j] = sum_x, sum_v
+                _through(factor, p[n:], q[n:], lp, lq)
+                _through(residual, v, x, rv, rx)
                 k = 2 * n
                 for body in range(bodies):
                     total = complex(0.0, 0.0)
@@ -484,15 +484,8 @@ def posed_lines(arm, spindle, points, lines_x, lines_y):
                         row[k + 4 * m] = hp[d] * q[n + i] + p[n + i] * hq[d]
                         k += 1
                 k += 4 * m
-                turn = complex(0.0, -w)
-                for i in range(m):
-                    for j in range(i + 1):
-                        row[k] = turn * (p[n + i] * lq[j] + lp[j] * q[n + i])
-                        k += 1
-                for i in range(4):
-                    for j in range(i + 1):
-                        row[k] = v[i] * rx[j] + rv[j] * x[i]
-                        k += 1
+                k = _lower(row, k, complex(0.0, -w), (p[n:], q[n:]), (lp, lq))
+                k = _lower(row, k, complex(1.0, 0.0), (v[:4], x[:4]), (rv, rx))
                 row[k] = (y[0] * x[0] + y[2] * x[2] + y[4] * x[4]) * k_t * k_t
                 row[k + 1] = (y[1] * x[1] + y[3] * x[3] + y[5] * x[5]) * k_r * k_r
                 row[k + 2] = complex(0.0, w) * row[k]
