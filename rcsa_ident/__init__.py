@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from rcsa_ident.io.forces import read_forces
     from rcsa_ident.io.lobes import read_lobes
     from rcsa_ident.io.recordings import read_recording
+    from rcsa_ident.io.robot_results import read_robot_result
     from rcsa_ident.io.robots import read_robot
     from rcsa_ident.io.setups import read_campaign, read_tooling
     from rcsa_ident.machine.known_tip import KnownTip
@@ -112,6 +113,7 @@ __all__ = [
     "read_recording",
     "read_result",
     "read_robot",
+    "read_robot_result",
     "read_tap_tests",
     "read_tip",
     "read_tooling",
@@ -142,6 +144,7 @@ _ROOMS = {
     "io.forces": ("read_forces",),
     "io.lobes": ("read_lobes",),
     "io.recordings": ("read_recording",),
+    "io.robot_results": ("read_robot_result",),
     "io.robots": ("read_robot",),
     "io.setups": ("read_campaign", "read_tooling"),
     "machine.known_tip": ("KnownTip",),

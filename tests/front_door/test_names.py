@@ -20,6 +20,7 @@ NAMES = [
     "Receptance", "SemiDiscretisation", "Sensor", "SpeedVariation", "SpindleDrive", "TimeDomain", "TipModes", "Tooling",
     "ZeroOrder", "advise", "clamped", "connect", "estimate_forces", "hz", "identify", "listen", "material", "normal_modes", "plot_lobes",
     "read_campaign", "read_forces", "read_lobes", "read_machine", "read_modes", "read_recording", "read_result", "read_robot",
+    "read_robot_result",
     "read_tap_tests",
     "read_tip", "read_tooling", "ring", "rpm", "sample_campaign", "sample_robot", "sample_tooling", "stability_lobes", "stability_map",
     "surface_location_error", "tap",
