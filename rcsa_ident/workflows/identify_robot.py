@@ -17,9 +17,10 @@ from rcsa_ident.identification.model_order import Report
 from rcsa_ident.identification.posed.data import PosedData, posed_data
 from rcsa_ident.identification.posed.fit import fit_robot
 from rcsa_ident.identification.posed.priors import arm_priors
-from rcsa_ident.identification.posed.result import RobotIdentification, answer, check_postures
+from rcsa_ident.identification.posed.result import RobotCode, RobotIdentification, answer, check_postures
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machining_setup import Campaign
+from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.rods import rod_poles
@@ -54,7 +55,11 @@ def identify_robot(
     data, postures = robot_data(campaign, readings, robot)
     priors = arm_priors(robot.model, robot.tilts)
     found, misfit, rival = fit_robot(data, priors, seed, map, _unheard if report is None else report)
-    return answer(robot.model, robot.tilts, found, misfit, rival, seed, postures)
+    result = answer(robot.model, robot.tilts, found, misfit, rival, seed, postures)
+    if not campaign.rough:
+        return result
+    words = "toolings were taken as drawn, whatever their [spread] says: of cuts on a robot nothing of them is learned"
+    return replace(result, notes=(*result.notes, Remark(RobotCode.DRAWINGS_EXACT, words)))
 
 
 def robot_data(campaign: Campaign, readings: Sequence[Reading], robot: FlexibleRobot) -> tuple[PosedData, FloatArray]:

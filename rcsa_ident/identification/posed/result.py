@@ -37,6 +37,7 @@ class RobotCode(StrEnum):
     FEW_POSTURES = "few-postures"
     ONE_TOOLING = "one-tooling"
     SPRINGS_UNKNOWN = "springs-unknown"
+    DRAWINGS_EXACT = "drawings-exact"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
