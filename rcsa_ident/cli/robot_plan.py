@@ -24,6 +24,7 @@ class TestsName(StrEnum):
     """What is measured at the postures, by name."""
 
     static = "static"
+    cuts = "cuts"
     modes = "modes"
     encoders = "encoders"
     payload = "payload"
@@ -37,7 +38,8 @@ def plan(
     tests: Annotated[
         TestsName,
         typer.Option(
-            help="static: forces and displacements of the tool, for all springs and plays; modes: natural frequencies from "
+            help="static: forces and displacements of the tool, for all springs and plays; cuts: slow stable cuts, for springs, dampers "
+            "and masses; modes: natural frequencies from "
             "taps, for all springs; encoders: twist of the drives under the arm's "
             "weight, for their stiffness; payload: the same, for the payload's mass."
         ),
@@ -56,6 +58,7 @@ def plan(
     force_n: Annotated[float, typer.Option(help="Largest force of a static test, N.")] = 1000.0,
     noise_mm: Annotated[float, typer.Option(help="Scatter of a displacement, mm.")] = 0.06,
     frequency_noise_percent: Annotated[float, typer.Option(help="Scatter of a natural frequency, %.")] = 0.5,
+    cut_noise_percent: Annotated[float, typer.Option(help="Share of a cut's lines that nothing explains, %.")] = 0.5,
     encoder_noise_urad: Annotated[float, typer.Option(help="Scatter of a joint's encoder, µrad.")] = 1.0,
     seed: Seed = 0,
     json_: Json = False,
@@ -72,6 +75,8 @@ def plan(
     arm = read_robot(robot)
     if tests is TestsName.static:
         experiment = robot_design.static_tests(arm, force_n, 1e-3 * noise_mm)
+    elif tests is TestsName.cuts:
+        experiment = robot_design.stable_cuts(arm, 1e-2 * cut_noise_percent)
     elif tests is TestsName.modes:
         experiment = robot_design.natural_frequencies(arm, 1e-2 * frequency_noise_percent)
     elif tests is TestsName.encoders:

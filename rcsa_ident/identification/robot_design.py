@@ -16,16 +16,22 @@ from scipy.optimize import minimize
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.identification.experiment_design import d_optimal
+from rcsa_ident.identification.posed.data import body_masses
+from rcsa_ident.identification.posed.priors import arm_priors
 from rcsa_ident.identification.robot_static import REPEATABILITY, StaticTests, expected_information
 from rcsa_ident.machine.robot.compliance import twist_per_payload
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques
 from rcsa_ident.machine.robot.kinematics import posed, tool_point_at
 from rcsa_ident.machine.robot.model import RobotModel
-from rcsa_ident.machine.robot.sensitivity import frequency_slopes
+from rcsa_ident.machine.robot.sensitivity import frequency_slopes, receptance_slopes
+from rcsa_ident.units import from_hz
 
 #: Scatter of a joint's encoder [rad], and of a natural frequency as a share; so many of these are heard.
 ENCODER, FREQUENCY, MODES = 1e-6, 5e-3, 8
+#: Lines of slow cuts [Hz], the share of each that nothing explains, their force in X and Y (its size does not matter), and how far in front
+#: of the flange it acts [m].
+CUT_LINES, CUT_NOISE, CUT_FORCE, CUT_TOOL = np.geomspace(15.0, 120.0, 20), 5e-3, np.array([0.5, 1.0j]), 0.17
 #: Shares of the largest force with which each axis is pushed, one after the other: levels tell play and spring apart.
 LEVELS = (0.5, 1.0, -0.5, -1.0)
 #: Steps that bring a drawn posture's tool into the box, their damping [m], postures drawn for each that is wanted, and before giving up.
@@ -132,6 +138,51 @@ def natural_frequencies(robot: RobotModel, noise: float = FREQUENCY) -> Experime
     # an arm without masses is refused here, and not only at the first posture
     information(np.zeros(len(robot.joints)))
     return Experiment(robot.spring_names(), np.eye(stiffness.size), information)
+
+
+def stable_cuts(robot: RobotModel, noise: float = CUT_NOISE) -> Experiment:
+    """Return slow stable cuts, as `identify_robot` takes them: the flange's motion along X and Y at lines of the arm's own band.
+
+    Unknowns are compliances, logarithms of dampers and of the masses of links and payload, in units of what is believed of them
+    (`posed.priors`). Forces are those of half an immersion, fed along the tool's x; faster cuts tell the spindle, wherever they are made.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    noise : float
+        Share of each line that nothing explains.
+
+    Raises
+    ------
+    InputError
+        If no masses are known.
+    """
+    positive("cut noise", noise, "share")
+    priors, chain, arm = arm_priors(robot), robot.chain(), FlexibleRobot(robot)
+    damping = np.exp(priors.centre[chain.stiffness.size : 2 * chain.stiffness.size])
+    damped = FlexibleRobot(robot.with_springs(chain.stiffness, damping))
+    size = np.concatenate([-chain.stiffness, damping, body_masses(robot)]) * priors.spread
+    omega = from_hz(CUT_LINES)
+    # a force at the tip is one at the flange and a moment about it
+    pushed = np.kron(CUT_FORCE, [1.0, -CUT_TOOL, 0.0])[[0, 1, 3, 4, 2, 5]]
+
+    def information(posture: FloatArray) -> FloatArray:
+        moved = damped.at(posture).receptance(omega).values @ pushed
+        slopes = receptance_slopes(damped, posture, omega)
+        change = np.concatenate([slopes.stiffness, slopes.damping, slopes.mass]) @ pushed
+        rows = (change[:, :, [0, 2]] * size[:, None, None] / (noise * np.abs(moved[:, [0, 2]]))).reshape(size.size, -1)
+        return rows.real @ rows.real.T + rows.imag @ rows.imag.T
+
+    # an arm without masses is refused here, and not only at the first posture
+    arm.at(np.zeros(len(robot.joints)))
+    bodies = (*(joint.name for joint in robot.joints), "payload")[: size.size - 2 * damping.size]
+    names = robot.spring_names()
+    unknowns = (
+        *names,
+        *(f"damper of {name}" for name in names),
+        *(f"mass behind {name}" if name != "payload" else name for name in bodies),
+    )
+    return Experiment(unknowns, np.eye(size.size), information)
 
 
 def payload_mass(robot: RobotModel, noise: float = ENCODER) -> Experiment:

@@ -8,7 +8,11 @@ import pytest
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.experiment_design import d_optimal
+from rcsa_ident.identification.posed.priors import arm_priors
 from rcsa_ident.identification.robot_design import (
+    CUT_LINES,
+    CUT_NOISE,
+    CUT_TOOL,
     LEVELS,
     PlannedPostures,
     Reach,
@@ -17,6 +21,7 @@ from rcsa_ident.identification.robot_design import (
     natural_frequencies,
     payload_mass,
     plan_postures,
+    stable_cuts,
     static_tests,
 )
 from rcsa_ident.identification.robot_static import fit_static
@@ -158,8 +163,39 @@ def test_natural_frequencies_beside_frequencies_of_changed_arms():
     assert planned.gain > drawn.gain + 1.0
 
 
+def test_slow_cuts_beside_lines_of_changed_arms():
+    """What they tell is the lines' change with each spring, damper and mass, in shares of what is believed of it and of the line."""
+    arm = robot("tx200")
+    experiment, priors = stable_cuts(arm), arm_priors(arm)
+    told = experiment.information(TABLE_7)
+    assert len(experiment.unknowns) == told.shape[0] == 2 * 18 + 7
+    assert np.all(np.linalg.eigvalsh(told) > -1e-9 * told.max())
+    omega, pushed = 2.0 * np.pi * CUT_LINES, np.array([0.5, -0.5 * CUT_TOOL, 1.0j, -1.0j * CUT_TOOL, 0.0, 0.0])
+    chain = arm.chain()
+
+    def lines(unknown):
+        stiffness, damping = chain.stiffness / (1.0 + unknown[:18]), chain.damping * np.exp(unknown[18:36])
+        changed = arm.with_springs(stiffness, damping).heavier(np.exp(unknown[36:]))
+        return (FlexibleRobot(changed).at(TABLE_7).receptance(omega).values @ pushed)[:, [0, 2]]
+
+    size, rows = np.abs(lines(np.zeros(43))), []
+    for i in range(0, 43, 4):
+        step = np.zeros(43)
+        step[i] = 1e-4
+        change = (lines(step) - lines(-step)) / 2e-4 * priors.spread[i] / (CUT_NOISE * size)
+        rows.append(np.concatenate([change.real.ravel(), change.imag.ravel()]))
+    own = np.arange(0, 43, 4)
+    np.testing.assert_allclose(told[np.ix_(own, own)], np.array(rows) @ np.array(rows).T, atol=1e-5 * told.max())
+    # J5's tilt about the wrist's axis stands behind J6: which of the two gives way no single posture tells
+    left = np.sqrt(np.diag(np.linalg.inv(experiment.prior + told)))
+    assert left[experiment.unknowns.index("J5 about z")] > 0.3
+    assert left[experiment.unknowns.index("J2")] < 0.1
+
+
 def test_bad_plans_are_named():
     arm = robot("kr500")
+    with pytest.raises(InputError, match="link masses"):
+        stable_cuts(arm)
     with pytest.raises(InputError, match="link masses"):
         natural_frequencies(arm)
     with pytest.raises(InputError, match="link masses"):

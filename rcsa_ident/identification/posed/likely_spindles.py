@@ -6,7 +6,7 @@ its modes, consistent with each other. Drawn ones are compared with the lines as
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
@@ -48,9 +48,9 @@ def spindle_of(numbers: FloatArray) -> tuple[SpindleParameters, FloatArray]:
     return SpindleParameters(omega_n, psi, pull, damping, root), numbers[9:]
 
 
-@cache
+@lru_cache(maxsize=1)
 def _whole_beam(length: float, front: float, rear: float) -> tuple[FloatArray, FloatArray]:
-    """Mass and stiffness of the free shaft."""
+    """Mass and stiffness of the free shaft, the same in both planes."""
     mass, stiffness = np.zeros((2, 2 * _ELEMENTS + 2, 2 * _ELEMENTS + 2))
     step = length / _ELEMENTS
     for e in range(_ELEMENTS):
