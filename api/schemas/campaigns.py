@@ -134,6 +134,7 @@ class CutConditions(BaseModel):
     lead_deg: float | None = Field(None, description="By which the tool leans in the direction of the feed, with engagement.")
     tilt_deg: float | None = None
     feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
+    posture_deg: list[float] | None = Field(None, description="Of a robot's joints; an identification here takes cuts at one posture.")
 
 
 class CutKeys(Body, CutConditions):

@@ -99,7 +99,8 @@ _CAMPAIGNS = (
         "workpiece": dict(_WORKPIECE),
         "toolings": {"S1": "toolings/S1.toml"},
         "cuts": [
-            {"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, "spindle_speed_to_rpm": 9e3, **_ANGLES, "cut": "recordings/1.h5"}
+            {"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, "spindle_speed_to_rpm": 9e3, **_ANGLES, "cut": "recordings/1.h5"},
+            {"id": "2", "tooling": "S1", "spindle_speed_rpm": 500.0, **_ANGLES, "cut": "recordings/2.h5", "posture_deg": [0.0, 20.0]},
         ],
     },
     {

@@ -170,11 +170,19 @@ def identify(
     Raises
     ------
     InputError
-        If no cut is usable, and there is no hammer test.
+        If no cut is usable, and there is no hammer test; or of a robot's cuts at several postures.
     """
+    _at_one_posture(campaign)
     found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings)
     clock = clock_remark(readings)
     return found if clock is None else replace(found, notes=(*found.notes, clock))
+
+
+def _at_one_posture(campaign: Campaign) -> None:
+    """Refuse cuts of a robot at several postures: each is another machine."""
+    postures = len({cut.posture for cut in campaign.cuts})
+    if postures > 1:
+        raise InputError("posture_deg", f"cuts at {postures} postures", "cuts at one posture; `robot identify` takes several together")
 
 
 def clock_error(readings: Sequence[Reading]) -> float | None:

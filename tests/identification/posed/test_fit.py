@@ -167,6 +167,10 @@ def test_what_is_wrong_with_a_result_is_named(told, tmp_path):
             read_robot_result(path)
 
 
+def test_several_postures_are_no_one_machine(folder):
+    assert "cuts at 4 postures" in run("identify", folder, "--out", folder.parent / "no.json", code=2)
+
+
 def test_a_campaign_beside_motions_is_refused(folder, robot_file):
     for others, words in (([folder], "one campaign directory alone"), (["--check", robot_file], "--check")):
         assert words in run("robot", "identify", robot_file, folder, *others, "--out", folder.parent / "no.json", code=2)
