@@ -9,15 +9,17 @@ import numpy as np
 from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from api import kept_documents
 from api.components import ThisService
-from api.conventions import BODY, After, Limit, Why, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8, while_there
+from api.conventions import BODY, After, Limit, Why, guard, page, problems, utf8, while_there
+from api.kept_documents import JSON, TOML, text_of_body
 from api.lookups import posed_robot, tooling_source
 from api.problems import Problem
-from api.schemas.common import NAME_PATTERN, Page, body_of
+from api.schemas.common import NAME_PATTERN, Page
 from api.schemas.robot_queries import MapAnswer, MapQuery, PathAnswer, PathPreview, PathQuery, PostureAnswer, PostureQuery
 from api.schemas.robots import EXAMPLE, RobotAnswer, RobotKeys, RobotSummary
 from api.security import Guarded, WhoAsks, now
-from api.stores.entities import Document, Stale, digest_of, summary_of
+from api.stores.entities import Document, digest_of, summary_of
 from api.work import robots as work
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.paths import path_of
@@ -25,7 +27,7 @@ from rcsa_ident.io.toml_text import toml_of
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=Guarded)
 RobotName = Annotated[str, Path(pattern=NAME_PATTERN, description="Name of a robot that is kept.")]
-TOML, JSON, CSV = "application/toml", "application/json", "text/csv"
+CSV = "text/csv"
 _LARGEST_PATH = 1_000_000
 _ROBOT = {
     "required": True,
@@ -46,22 +48,11 @@ _PATH = {"required": True, "content": {CSV: {"schema": {"type": "string"}}}}
 )
 async def write(name: RobotName, request: Request, response: Response, parts: ThisService, caller: WhoAsks, why: Why = "") -> RobotAnswer:
     raw = await request.body()
-    text = await run_in_threadpool(_text_of_body, request, raw)
+    text = await run_in_threadpool(text_of_body, request, raw, RobotKeys, work.LARGEST, "robot")
     # modes of what strangers write are looked for in another process
     summary = await while_there(request, parts.work.run(work.summary, text))
-
-    def keep() -> tuple[bool, Document]:
-        document = Document(caller.group, name, text, json.dumps(summary), digest_of(text), now())
-        kept = parts.store.robots
-        before = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
-        return kept.put(document, before, caller.note(why)), document
-
-    try:
-        new, document = await run_in_threadpool(keep)
-    except Stale:
-        raise Problem(412, "the robot is not the one that the query expects") from None
-    response.status_code = 201 if new else 200
-    response.headers.update(tagged(document.digest))
+    document = Document(caller.group, name, text, json.dumps(summary), digest_of(text), now())
+    await run_in_threadpool(kept_documents.keep, parts.store.robots, document, request, response, caller.note(why), "robot")
     return answer_of(document)
 
 
@@ -84,26 +75,12 @@ def list_robots(parts: ThisService, caller: WhoAsks, after: After = "", limit: L
     },
 )
 def get(name: RobotName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
-    document = found_or_404(parts.store.robots.get(caller.group, name), "robot")
-    headers = tagged(document.digest) | {"Vary": "Accept"}
-    if unchanged(request, document.digest):
-        return Response(status_code=304, headers=headers)
-    if TOML in request.headers.get("accept", ""):
-        return Response(document.text.encode(), media_type=TOML, headers=headers)
-    return Response(answer_of(document).model_dump_json(), media_type=JSON, headers=headers)
+    return kept_documents.show(parts.store.robots, caller.group, name, request, "robot", answer_of)
 
 
 @router.delete("/{name}", status_code=204, summary="Forget a robot", openapi_extra=guard("upload"), responses=problems(404, 412, 422))
 def forget(name: RobotName, request: Request, parts: ThisService, caller: WhoAsks, why: Why = "") -> Response:
-    kept = parts.store.robots
-    try:
-        seen = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
-        there = kept.delete(caller.group, name, seen, caller.note(why))
-    except Stale:
-        raise Problem(412, "the robot is not the one that the query expects") from None
-    if not there:
-        raise Problem(404, "there is no such robot")
-    return Response(status_code=204)
+    return kept_documents.forget(parts.store.robots, caller.group, name, request, caller.note(why), "robot")
 
 
 @router.post(
@@ -177,14 +154,6 @@ async def _subject(parts: ThisService, group: str, body: PathQuery) -> tuple[Any
         return posed_robot(parts, group, body.robot), tooling_source(parts, group, body.tooling)
 
     return await run_in_threadpool(look)
-
-
-def _text_of_body(request: Request, raw: bytes) -> str:
-    if len(raw) > work.LARGEST:
-        raise Problem(413, f"a robot has at most {work.LARGEST // 1000} kB")
-    if request.headers["content-type"].split(";")[0].strip().lower() == TOML:
-        return utf8(raw)
-    return toml_of(body_of(RobotKeys, raw).model_dump(exclude_unset=True, exclude_none=True))
 
 
 def answer_of(document: Document) -> RobotAnswer:

@@ -8,19 +8,20 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from api import kept_documents
 from api.components import ThisService
-from api.conventions import BODY, After, Limit, ToolingName, Why, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
-from api.problems import Problem
-from api.schemas.common import Page, body_of
+from api.conventions import BODY, After, Limit, ToolingName, Why, found_or_404, guard, page, problems, tagged, unchanged
+from api.kept_documents import JSON, TOML, text_of_body
+from api.schemas.common import Page
 from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
 from api.security import Guarded, WhoAsks, now
-from api.stores.entities import Document, Stale, digest_of, summary_of
+from api.stores.entities import Document, digest_of, summary_of
 from api.work.toolings import LARGEST, parsed, tooling_of
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.report.drawing import tooling_svg
 
 router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)
-TOML, JSON, SVG = "application/toml", "application/json", "image/svg+xml"
+SVG = "image/svg+xml"
 #: Opened as a page of its own a drawing runs nothing and loads nothing.
 _ALONE = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
 TOOLING_BODY = {
@@ -44,20 +45,13 @@ async def write(
 ) -> ToolingAnswer:
     raw = await request.body()
 
-    def keep() -> tuple[bool, Document]:
-        text = text_of_body(request, raw)
+    def keep() -> Document:
+        text = tooling_text(request, raw)
         document = Document(caller.group, name, text, json.dumps(summary(text)), digest_of(text), now())
-        kept = parts.store.toolings
-        before = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
-        return kept.put(document, before, caller.note(why)), document
+        kept_documents.keep(parts.store.toolings, document, request, response, caller.note(why), "tooling")
+        return document
 
-    try:
-        new, document = await run_in_threadpool(keep)
-    except Stale:
-        raise Problem(412, "the tooling is not the one that the query expects") from None
-    response.status_code = 201 if new else 200
-    response.headers.update(tagged(document.digest))
-    return answer_of(document)
+    return answer_of(await run_in_threadpool(keep))
 
 
 @router.get("", summary="List toolings", openapi_extra=guard("read"), responses=problems(422))
@@ -81,13 +75,7 @@ def list_toolings(parts: ThisService, caller: WhoAsks, after: After = "", limit:
     },
 )
 def get(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
-    document = found_or_404(parts.store.toolings.get(caller.group, name), "tooling")
-    headers = tagged(document.digest) | {"Vary": "Accept"}
-    if unchanged(request, document.digest):
-        return Response(status_code=304, headers=headers)
-    if TOML in request.headers.get("accept", ""):
-        return Response(document.text.encode(), media_type=TOML, headers=headers)
-    return Response(answer_of(document).model_dump_json(), media_type=JSON, headers=headers)
+    return kept_documents.show(parts.store.toolings, caller.group, name, request, "tooling", answer_of)
 
 
 @router.get(
@@ -126,31 +114,19 @@ async def draw(request: Request) -> Response:
     raw = await request.body()
 
     def drawn() -> str:
-        return tooling_svg(tooling_of(text_of_body(request, raw)))
+        return tooling_svg(tooling_of(tooling_text(request, raw)))
 
     return Response(await run_in_threadpool(drawn), media_type=SVG, headers=_ALONE)
 
 
 @router.delete("/{name}", status_code=204, summary="Forget a tooling", openapi_extra=guard("upload"), responses=problems(404, 412, 422))
 def forget(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks, why: Why = "") -> Response:
-    kept = parts.store.toolings
-    try:
-        seen = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
-        there = kept.delete(caller.group, name, seen, caller.note(why))
-    except Stale:
-        raise Problem(412, "the tooling is not the one that the query expects") from None
-    if not there:
-        raise Problem(404, "there is no such tooling")
-    return Response(status_code=204)
+    return kept_documents.forget(parts.store.toolings, caller.group, name, request, caller.note(why), "tooling")
 
 
-def text_of_body(request: Request, raw: bytes) -> str:
+def tooling_text(request: Request, raw: bytes) -> str:
     """Return the text of a tooling file from a body in TOML or JSON."""
-    if len(raw) > LARGEST:
-        raise Problem(413, f"a tooling has at most {LARGEST // 1000} kB")
-    if request.headers["content-type"].split(";")[0].strip().lower() == TOML:
-        return utf8(raw)
-    return toml_of(body_of(ToolingKeys, raw).model_dump(exclude_unset=True, exclude_none=True))
+    return text_of_body(request, raw, ToolingKeys, LARGEST, "tooling")
 
 
 def summary(text: str) -> dict[str, Any]:

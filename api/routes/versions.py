@@ -11,11 +11,12 @@ from fastapi.concurrency import run_in_threadpool
 
 from api.components import Components, ThisService
 from api.conventions import BODY, Limit, MachineId, ToolingName, Why, expected, found_or_404, guard, page, problems, tagged
+from api.kept_documents import JSON, TOML
 from api.lookups import machine_of
 from api.problems import Problem
 from api.routes import robots
 from api.routes.machines import CSV, summary_of
-from api.routes.toolings import JSON, TOML, TOOLING_BODY, answer_of, summary, text_of_body
+from api.routes.toolings import TOOLING_BODY, answer_of, summary, tooling_text
 from api.schemas.common import NAME_PATTERN, Page
 from api.schemas.machines import Identification, IdentificationSummary
 from api.schemas.robots import RobotAnswer, RobotKeys
@@ -64,7 +65,7 @@ async def compare(name: ToolingName, request: Request, components: ThisService, 
     raw = await request.body()
 
     def compared() -> Differences:
-        text = text_of_body(request, raw)
+        text = tooling_text(request, raw)
         summary(text)
         there = found_or_404(components.store.toolings.get(caller.group, name), "tooling")
         return Differences(etag=there.digest, differences=_differences(parsed(there.text), parsed(text)))
