@@ -52,19 +52,23 @@ def evidence(solution: Solution, misfit: Misfit) -> float:
     return value if sign > 0.0 and np.isfinite(value) else np.inf
 
 
-class ModeSteps(Protocol):
-    """How a model comes to have one mode less or more."""
+class Growth(Protocol):
+    """How a model comes to have one mode more."""
 
     def groups(self, layout: Unknowns) -> int:
         """Return how many sets of modes there are, each with its own lines."""
         ...
 
-    def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
-        """Return all models with one mode less, none of them with less than the smallest number."""
-        ...
-
     def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
         """Return the most promising models with one mode more in set `i`."""
+        ...
+
+
+class ModeSteps(Growth, Protocol):
+    """How a model comes to have one mode less or more."""
+
+    def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
+        """Return all models with one mode less, none of them with less than the smallest number."""
         ...
 
 
@@ -177,7 +181,7 @@ def exchange_modes(
     return best
 
 
-def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float], steps: ModeSteps = PLANES) -> Solution:
+def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float], steps: Growth = PLANES) -> Solution:
     """Return the model with one more mode for each axis, whether or not the evidence asks for it.
 
     A machine has more modes than the data can show. A model that leaves them out is sure of what it cannot know; with them the
@@ -190,7 +194,7 @@ def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float],
     misfit : Misfit
     band_hz : (float, float) [Hz]
         Lowest and highest line.
-    steps : ModeSteps
+    steps : Growth
     """
     for i in range(steps.groups(solution.layout)):
         trials = []

@@ -14,12 +14,12 @@ from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.model_order import Report
-from rcsa_ident.identification.posed.data import PosedData, posed_data
+from rcsa_ident.identification.posed.data import PosedData, check_postures, posed_data
 from rcsa_ident.identification.posed.fit import fit_robot
 from rcsa_ident.identification.posed.priors import arm_priors
-from rcsa_ident.identification.posed.result import RobotCode, RobotIdentification, answer, check_postures
+from rcsa_ident.identification.posed.result import RobotCode, RobotIdentification, answer
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.machining_setup import Campaign
+from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
@@ -69,9 +69,8 @@ def robot_data(campaign: Campaign, readings: Sequence[Reading], robot: FlexibleR
     if campaign.rough:
         campaign = replace(campaign, toolings={name: replace(tooling, spread=EXACT) for name, tooling in campaign.toolings.items()})
     data = data_of(campaign, readings)
-    of_id = {cut.id: cut for cut in campaign.cuts}
-    postures, of_cut = check_postures([of_id[id].posture for id in data.cut_ids], data.cut_ids, robot.model)
     beside = _Beside(campaign, data)
+    postures, of_cut = check_postures([beside.cuts[id].posture for id in data.cut_ids], data.cut_ids, robot.model)
     teeth = {name: tooling.cutter.teeth for name, tooling in campaign.toolings.items()}
     return posed_data(data, robot, postures, of_cut, teeth, beside.rods, beside.axial), postures
 
@@ -82,6 +81,11 @@ class _Beside:
 
     campaign: Campaign
     data: IdentificationData
+
+    @cached_property
+    def cuts(self) -> dict[str, Cut]:
+        """By their names."""
+        return {cut.id: cut for cut in self.campaign.cuts}
 
     @cached_property
     def _poles(self) -> dict[str, tuple[PoleModel, PoleModel]]:
@@ -96,7 +100,7 @@ class _Beside:
 
     def axial(self, cut: int, orders: np.ndarray) -> tuple[ComplexArray, ComplexArray]:
         """Of `posed.data.Axial`."""
-        made = next(each for each in self.campaign.cuts if each.id == self.data.cut_ids[cut])
+        made = self.cuts[self.data.cut_ids[cut]]
         cutter = self.campaign.toolings[made.tooling].cutter
         force, slope = axial_and_slope(cutter, made.conditions, self.campaign.coefficients, orders)
         # of all terms, those that the data have as unknowns; run-out moves the axial force as little as its lines are used for

@@ -163,6 +163,23 @@ def posed_data(
     )
 
 
+def check_postures(postures: Sequence[tuple[float, ...]], ids: Sequence[str], robot: RobotModel) -> tuple[FloatArray, np.ndarray]:
+    """Return the postures of cuts, each once, and which of them each cut has; shapes (c, j) [rad], (k,).
+
+    Raises
+    ------
+    InputError
+        If a cut tells none, or one of another number of joints.
+    """
+    for id, posture in zip(ids, postures, strict=True):
+        if len(posture) != len(robot.joints):
+            found = f"{len(posture)} angles of cut {id}" if posture else f"nothing of cut {id}"
+            raise InputError("posture_deg", found, f"{len(robot.joints)} angles, one a joint [°], of every cut")
+    # a control tells its angles to a ten-thousandth of a degree
+    every, of_cut = np.unique(np.round(np.degrees(np.array(postures)), 4), axis=0, return_inverse=True)
+    return np.radians(every), of_cut.ravel()
+
+
 def roots_of_mass(robot: FlexibleRobot, posture: FloatArray) -> FloatArray:
     """Return G of each link and of the payload, G^T G what it adds to the mass matrix at a posture, shape (b, 6, n) [sqrt(kg) m]."""
     values, vectors = np.linalg.eigh(mass_slopes(robot.model, posture, robot.tilts))

@@ -1,4 +1,4 @@
-"""One mode of the spindle less or more, the arm as it is."""
+"""One mode of the spindle more, the arm as it is."""
 
 from __future__ import annotations
 
@@ -16,19 +16,13 @@ from rcsa_ident.identification.posed.parameters import PosedLayout, SpindleParam
 PROMISING = 4
 
 
-class PosedSteps:
+class PosedGrowth:
     """All modes belong to the spindle; an arm has as many as it has freedoms."""
 
     def groups(self, layout: Unknowns) -> int:
         """Return 1: every line feels every mode."""
         del layout
         return 1
-
-    def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
-        """Return the robots whose spindle has one mode less."""
-        spindle = _spindle(solution)
-        everyone = np.arange(spindle.order)
-        return [_with(solution, spindle.of(everyone != k)) for k in everyone] if spindle.order > smallest else []
 
     def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
         """Return the robots whose spindle has one mode more in front, at the frequencies and along the shapes that promise most."""
@@ -38,7 +32,7 @@ class PosedSteps:
         return [_with(solution, spindle.with_mode(omega_n, shape, zeta)) for omega_n, zeta, shape in modes]
 
 
-POSED = PosedSteps()
+POSED = PosedGrowth()
 
 
 def layout_of(layout: Unknowns) -> PosedLayout:

@@ -143,12 +143,6 @@ class SpindleParameters:
         """Number of modes."""
         return self.omega_n.size
 
-    def of(self, modes: np.ndarray) -> SpindleParameters:
-        """Return the spindle with some of its modes (a mask or indices), their damping as it was."""
-        own = self.factor[modes]
-        factor = np.linalg.cholesky(own @ own.T) if own.size else np.zeros((0, 0))
-        return SpindleParameters(self.omega_n[modes], self.psi[modes], self.pull[modes], factor, self.residual)
-
     def with_mode(self, omega_n: float, psi: FloatArray, zeta: float) -> SpindleParameters:
         """Return the spindle with one more mode in front, uncoupled to the others, which the housing does not pull.
 

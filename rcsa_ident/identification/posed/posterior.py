@@ -48,8 +48,8 @@ class RobotUnknowns:
         return joint_of(self.theta[self.layout.joint])
 
     @property
-    def spindle(self) -> CarriedSpindle | None:
-        """The spindle's modes; None where it is as good as rigid."""
+    def spindle(self) -> CarriedSpindle:
+        """The spindle's modes."""
         own = unpack(self.theta, self.layout).spindle
         residual = own.residual @ own.residual.T * np.outer(_SI, _SI)
         return CarriedSpindle(own.omega_n, own.factor @ own.factor.T, own.psi * _SI, own.pull / _SI, residual)

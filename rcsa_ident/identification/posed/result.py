@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.posed.misfit import PosedMisfit
 from rcsa_ident.identification.posed.modes import layout_of
@@ -156,20 +154,3 @@ def _notes(result: RobotIdentification) -> list[Remark]:
         return []
     words = f"springs that these cuts do not tell, left near what the data sheet says: {', '.join(unknown)}"
     return [Remark(RobotCode.SPRINGS_UNKNOWN, words)]
-
-
-def check_postures(postures: Sequence[tuple[float, ...]], ids: Sequence[str], robot: RobotModel) -> tuple[FloatArray, np.ndarray]:
-    """Return the postures of cuts, each once, and which of them each cut has; shapes (c, j) [rad], (k,).
-
-    Raises
-    ------
-    InputError
-        If a cut tells none, or one of another number of joints.
-    """
-    for id, posture in zip(ids, postures, strict=True):
-        if len(posture) != len(robot.joints):
-            found = f"{len(posture)} angles of cut {id}" if posture else f"nothing of cut {id}"
-            raise InputError("posture_deg", found, f"{len(robot.joints)} angles, one a joint [°], of every cut")
-    # a control tells its angles to a ten-thousandth of a degree
-    every, of_cut = np.unique(np.round(np.degrees(np.array(postures)), 4), axis=0, return_inverse=True)
-    return np.radians(every), of_cut.ravel()

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.posed.likely_spindles import drawn, spindle_of
+from rcsa_ident.identification.posed.data import check_postures
 from rcsa_ident.identification.posed.misfit import PosedMisfit
 from rcsa_ident.identification.posed.parameters import PosedLayout
 from rcsa_ident.identification.posed.posterior import RobotPosterior, RobotUnknowns
 from rcsa_ident.identification.posed.priors import arm_priors, posed_prior_rows
-from rcsa_ident.identification.posed.result import check_postures
 from rcsa_ident.io.robot_results import read_robot_result
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
@@ -127,16 +126,6 @@ def test_postures_are_told_once():
     postures, of_cut = check_postures([tuple(POSTURES[k]) for k in (1, 0, 1, 2)], list("ABCD"), sheet())
     assert postures.shape == (3, 6)
     np.testing.assert_allclose(postures[of_cut], POSTURES[[1, 0, 1, 2]], atol=1e-5)
-
-
-def test_a_drawn_spindle_with_one_mode_less_keeps_its_damping():
-    spindle, _ = spindle_of(drawn(1, np.random.default_rng(0))[0])
-    everyone = np.arange(spindle.order)
-    fewer = spindle.of(everyone != 2)
-    whole = spindle.factor @ spindle.factor.T
-    kept = everyone != 2
-    np.testing.assert_allclose(fewer.factor @ fewer.factor.T, whole[np.ix_(kept, kept)], rtol=1e-12)
-    assert fewer.order == spindle.order - 1
 
 
 def test_the_result_takes_the_robots_place(told, folder, tmp_path):
