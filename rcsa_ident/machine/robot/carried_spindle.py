@@ -1,4 +1,8 @@
-"""A spindle in a robot's hand: shaft and bearings as modes of a housing that is held, which the hand's motion pulls along."""
+"""A spindle in a robot's hand: shaft and bearings as modes of a housing that is held, which the hand's motion pulls along [craig1968].
+
+With u the hand's motion, eta the modes and f a force at the flange: eta'' + D eta' + W^2 eta = psi f - P u'', and the hand feels -P^T eta''
+beside its payload's own inertia; the flange moves by u + psi^T eta.
+"""
 
 from __future__ import annotations
 
