@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.posed.misfit import PosedMisfit
 from rcsa_ident.identification.posed.modes import layout_of
@@ -34,6 +35,7 @@ class RobotCode(StrEnum):
     CONTRADICTING_CUTS = "contradicting-cuts"
     FEW_POSTURES = "few-postures"
     ONE_TOOLING = "one-tooling"
+    NOT_PASSIVE = "not-passive"
     SPRINGS_UNKNOWN = "springs-unknown"
     DRAWINGS_EXACT = "drawings-exact"
 
@@ -139,6 +141,11 @@ def _reasons(result: RobotIdentification, found: Solution, misfit: PosedMisfit) 
         names = ", ".join(np.array(misfit.data.cut_ids)[bad][:5].tolist())
         words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, among them {names}"
         reasons.append(Remark(RobotCode.CONTRADICTING_CUTS, words))
+    if heavy := too_heavy_at(result.posterior, result.postures):
+        words = (
+            f"the spindle's modes swing more mass than the hand carries at {heavy} of {len(result.postures)} postures: no tip is told there"
+        )
+        reasons.append(Remark(RobotCode.NOT_PASSIVE, words))
     if len(result.postures) < FEWEST_POSTURES:
         words = f"cuts at {len(result.postures)} postures: at least {FEWEST_POSTURES} tell the joints apart, better 6"
         reasons.append(Remark(RobotCode.FEW_POSTURES, words))
@@ -146,6 +153,17 @@ def _reasons(result: RobotIdentification, found: Solution, misfit: PosedMisfit) 
         words = "only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder"
         reasons.append(Remark(RobotCode.ONE_TOOLING, words))
     return reasons
+
+
+def too_heavy_at(posterior: RobotPosterior, postures: FloatArray) -> int:
+    """Return at how many postures the spindle's modes would swing more mass than the hand carries: nothing in the fit forbids it."""
+    spindle, count = posterior.best.spindle, 0
+    for posture in postures:
+        try:
+            spindle.on(posterior.arm.at(posture))
+        except InputError:
+            count += 1
+    return count
 
 
 def _notes(result: RobotIdentification) -> list[Remark]:

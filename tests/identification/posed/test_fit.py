@@ -1,5 +1,7 @@
 """Cuts at four postures of a virtual robot, its own multibody, tell springs, spindle and tips at a fifth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from rcsa_ident.identification.posed.misfit import PosedMisfit
 from rcsa_ident.identification.posed.parameters import PosedLayout
 from rcsa_ident.identification.posed.posterior import RobotPosterior, RobotUnknowns
 from rcsa_ident.identification.posed.priors import arm_priors, posed_prior_rows
+from rcsa_ident.identification.posed.result import too_heavy_at
 from rcsa_ident.io.robot_results import read_robot_result
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
@@ -140,6 +143,15 @@ def test_the_result_takes_the_robots_place(told, folder, tmp_path):
     assert checked["natural_frequencies_hz"][0] > 5.0
     refused = run("robot", "check", result, "--joints-only", code=2)
     assert "--joints-only" in refused
+
+
+def test_a_spindle_that_swings_more_than_the_hand_carries_is_told(told):
+    posterior = told[2]
+    assert too_heavy_at(posterior, POSTURES) == 0
+    theta = posterior.best.theta.copy()
+    theta[posterior.best.layout.pulls] *= 10.0
+    heavy = replace(posterior, best=replace(posterior.best, theta=theta))
+    assert too_heavy_at(heavy, POSTURES) == len(POSTURES)
 
 
 def test_what_is_wrong_with_a_result_is_named(told, tmp_path):
