@@ -58,6 +58,7 @@ STUDIES = (
     "workpiece_side",
     "corner_radius",
     "robot_cuts",
+    "robot_milling",
 )
 
 

@@ -12,7 +12,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.rows import Rows, rows_of
-from rcsa_ident.cutting.teeth import edges_at
+from rcsa_ident.cutting.teeth import slices_of
 
 
 class ForceTerm(StrEnum):
@@ -318,20 +318,14 @@ def force_history(
     total = np.zeros((angle.size, 3))
     depth, engagement = conditions.axial_depth, conditions.engagement
     feed = conditions.feed_per_tooth * cutter.teeth / (2.0 * np.pi)
-    for segment, low, high in cutter.outline.pieces(depth, engagement.radii, engagement.heights):
-        _, ends, _ = segment.at(np.array([low, high]))
-        count = int(np.ceil(slices * np.ptp(ends) / depth - 1e-9))
-        r, z, kappa = segment.at(low + (high - low) * (np.arange(count) + 0.5) / count)
-        edges, arcs = edges_at(cutter, z, kappa), engagement.arcs(r, z)
-        # a wave leans the edge and lengthens it
-        leaning = np.arctan2(np.sin(kappa), np.cos(kappa) + edges.slope * np.sin(kappa))
-        width = segment.length * (high - low) / count * np.sin(kappa) / np.sin(leaning)
-        for j, k in np.ndindex(cutter.teeth, count):
-            phi = np.mod(angle + cutter.tooth_angle[j] - edges.lag[j, k], 2.0 * np.pi)
-            chip = _kinematic_chip(j, np.sin(phi), feed * edges.pitch[:, k], edges.offset[:, k])
-            inside = np.any((phi >= arcs[:, k, :1]) & (phi < arcs[:, k, 1:]), axis=0)
-            force = tooth_force(phi, chip * np.sin(leaning[j, k]), coefficients, leaning[j, k])
-            total += np.where((inside & (chip > 0.0))[:, None], force, 0.0) * width[j, k]
+    parts = slices_of(cutter, depth, slices, engagement.radii, engagement.heights)
+    arcs = engagement.arcs(parts.radius, parts.height)
+    for j, k in np.ndindex(parts.lag.shape):
+        phi = np.mod(angle + cutter.tooth_angle[j] - parts.lag[j, k], 2.0 * np.pi)
+        chip = _kinematic_chip(j, np.sin(phi), feed * parts.pitch[:, k], parts.offset[:, k])
+        inside = np.any((phi >= arcs[:, k, :1]) & (phi < arcs[:, k, 1:]), axis=0)
+        force = tooth_force(phi, chip * np.sin(parts.lean[j, k]), coefficients, parts.lean[j, k])
+        total += np.where((inside & (chip > 0.0))[:, None], force, 0.0) * parts.width[j, k]
     total[:, :2] = total[:, :2] @ conditions.machine_from_feed.T
     return total
 

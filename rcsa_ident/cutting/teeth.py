@@ -68,6 +68,64 @@ def edges_at(cutter: Cutter, z: FloatArray, kappa: FloatArray) -> Edges:
     return Edges(lag, pitch, offset, slope)
 
 
+class Slices(NamedTuple):
+    """A cut's edges in slices across the axis, from the tip up.
+
+    Parameters
+    ----------
+    radius, height : arrays, shape (n,) [m]
+        Of the outline in the middle of each slice.
+    lag, pitch, offset : arrays, shape (teeth, n) [rad, rad, m]
+        As in `Edges`.
+    lean : array, shape (teeth, n) [rad]
+        Of the edge's outward normal from the axis pointing down, waves included: pi/2 on a wall.
+    width : array, shape (teeth, n) [m]
+        Of edge in each slice.
+    """
+
+    radius: FloatArray
+    height: FloatArray
+    lag: FloatArray
+    pitch: FloatArray
+    offset: FloatArray
+    lean: FloatArray
+    width: FloatArray
+
+
+def slices_of(cutter: Cutter, depth: float, count: int, radii: tuple[float, ...] = (), heights: tuple[float, ...] = ()) -> Slices:
+    """Return a cut's slices.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    depth : float [m]
+    count : int
+        Slices, at least: each piece of the outline has its share.
+    radii, heights : tuples of float [m]
+        Where something about the cut changes: no slice lies on both sides.
+
+    Examples
+    --------
+    A wall of 10 mm, whose teeth wind by 26 degrees on the way up:
+
+    >>> slices = slices_of(Cutter(2, 0.01, helix=np.radians(30.0)), 0.004, 4)
+    >>> np.degrees(slices.lag[0]).round(1).tolist(), slices.width[0].round(6).tolist()
+    ([3.3, 9.9, 16.5, 23.2], [0.001, 0.001, 0.001, 0.001])
+    """
+    none, nowhere = np.zeros(0), np.zeros((cutter.teeth, 0))
+    found = [Slices(none, none, *(nowhere,) * 5)]
+    for segment, low, high in cutter.outline.pieces(depth, radii, heights):
+        _, ends, _ = segment.at(np.array([low, high]))
+        own = int(np.ceil(count * np.ptp(ends) / depth - 1e-9))
+        r, z, kappa = segment.at(low + (high - low) * (np.arange(own) + 0.5) / own)
+        edges = edges_at(cutter, z, kappa)
+        # a wave leans the edge and lengthens it
+        lean = np.arctan2(np.sin(kappa), np.cos(kappa) + edges.slope * np.sin(kappa))
+        width = segment.length * (high - low) / own * np.sin(kappa) / np.sin(lean)
+        found.append(Slices(r, z, edges.lag, edges.pitch, edges.offset, lean, width))
+    return Slices(*(np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True)))
+
+
 def lags(cutter: Cutter, z: FloatArray) -> FloatArray:
     """Return by which angle each edge lags its tip at heights above it [m], shape (teeth, n) [rad].
 
