@@ -117,9 +117,8 @@ def main(arguments: Sequence[str]) -> None:
                 force = np.abs(found.force).max(axis=0)
                 lost = ", tool lost" if found.lost else ""
                 name = f"{carrier.stiffness.size} freedoms, feed along the {direction}, {damper:g}"
-                print(
-                    f"| {name} | {force[0]:.0f}, {force[1]:.0f}{lost} | {beside[0]:.0f}, {beside[1]:.0f} | {wall(walls, 8e-3)} | {seconds:.2f} |"
-                )
+                cells = f"{force[0]:.0f}, {force[1]:.0f}{lost} | {beside[0]:.0f}, {beside[1]:.0f} | {wall(walls, 8e-3)}"
+                print(f"| {name} | {cells} | {seconds:.2f} |")
     conditions = CuttingConditions(
         ALUMINIUM.spindle_speed, ALUMINIUM.depth, feed(ALUMINIUM, 3700.0), Engagement(np.pi - np.arccos(0.2), np.pi)
     )
