@@ -25,8 +25,8 @@ def centre_of(start: tuple[float, float], end: tuple[float, float], radius: floa
 
     Examples
     --------
-    >>> centre_of((1.0, 0.0), (0.0, 1.0), 1.0, clockwise=False)
-    (0.0, 0.0)
+    >>> centre_of((1.0, 0.0), (0.0, 1.0), 1.0, clockwise=True)
+    (1.0, 1.0)
     """
     du, dv = end[0] - start[0], end[1] - start[1]
     chord = math.hypot(du, dv)
