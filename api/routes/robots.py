@@ -22,7 +22,7 @@ from api.security import Guarded, WhoAsks, now
 from api.stores.entities import Document, digest_of, summary_of
 from api.work import robots as work
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.paths import path_of
+from rcsa_ident.io.paths import tool_path_of
 from rcsa_ident.io.toml_text import toml_of
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=Guarded)
@@ -136,13 +136,13 @@ async def preview(request: Request) -> PathPreview:
 
     def read() -> PathPreview:
         try:
-            places, axes = path_of(utf8(raw), "")
+            found = tool_path_of(utf8(raw), "")
         except InputError as error:
             # a body has no file's name, but lines
             raise InputError(", ".join(filter(None, (error.where.strip(), error.field))), error.found, error.allowed) from None
-        if len(places) > work.MOST_PLACES:
-            raise InputError("places", f"{len(places)} of them", f"at most {work.MOST_PLACES}")
-        return PathPreview(places=np.hstack([(1e3 * places).round(9), axes]).tolist())
+        if len(found) > work.MOST_PLACES:
+            raise InputError("places", f"{len(found)} of them", f"at most {work.MOST_PLACES}")
+        return PathPreview(places=np.hstack([(1e3 * found.places).round(9), found.axes]).tolist())
 
     return await run_in_threadpool(read)
 

@@ -140,7 +140,10 @@ def map_(
         ),
     ],
     path: Annotated[
-        Path, typer.Option(help="PATH.csv of the tool's tip: x_mm, y_mm, z_mm, and i, j, k of the tool's axis.", show_default=False)
+        Path,
+        typer.Option(
+            help="PATH.nc (G-code) or PATH.csv of the tool's tip: x_mm, y_mm, z_mm, and i, j, k of the tool's axis.", show_default=False
+        ),
     ],
     out: Annotated[Path, typer.Option(help="MAP.csv to write: a limit for each place and speed.", show_default=False)],
     cut: CutOptions,
@@ -151,19 +154,19 @@ def map_(
     """Compute the stability limit at every place of a path and every speed: where on a part an arm may cut how deep."""
     import numpy as np
 
-    from rcsa_ident.io.paths import read_path, write_limits_along
+    from rcsa_ident.io.paths import read_tool_path, write_limits_along
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.robot_postures import following, limits_along
 
     writable(out)
     machine, tool = _posed(robot, posture, joints_only), read_tooling(tooling)
-    places, axes = read_path(path)
+    along = read_tool_path(path)
     change = change_of(machine, tool, cut_of(cut, speeds.speed_variation), speeds, False, 0.0)
     stages = Stages(quiet=json_)
-    postures = following(machine.robot.model, machine.angles, places, axes, tool.assembly)
+    postures = following(machine.robot.model, machine.angles, along.places, along.axes, tool.assembly)
     with stages.stage("limits") as line:
         limits, chatter = limits_along(change, postures, line)
-    write_limits_along(out, places, change.speeds, limits, chatter)
+    write_limits_along(out, along.places, change.speeds, limits, chatter)
     # the depth that every place allows, and the speed at which that is most
     worst = np.min(limits, axis=0)
     best = int(np.argmax(worst))
@@ -171,7 +174,7 @@ def map_(
     if json_:
         emit(
             {
-                "positions": len(places),
+                "positions": len(along),
                 "postures_deg": np.degrees(postures).tolist(),
                 "best_speed_rpm": to_rpm(float(change.speeds[best])),
                 "limit_everywhere_mm": depth,
@@ -185,7 +188,7 @@ def map_(
     say(f"at {to_rpm(float(change.speeds[best])):.0f} rev/min every place is stable up to {told}")
     for remark in machine.remarks:
         warn(remark)
-    say(f"written: {out} ({len(places)} places, {change.speeds.size} speeds, {stages.seconds['limits']:.2f} s)")
+    say(f"written: {out} ({len(along)} places, {change.speeds.size} speeds, {stages.seconds['limits']:.2f} s)")
 
 
 def _arm(path: Path, joints_only: bool) -> FlexibleRobot:

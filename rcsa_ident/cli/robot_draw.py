@@ -26,8 +26,8 @@ def draw(
     path: Annotated[
         Path | None,
         typer.Option(
-            help="PATH.csv of the tool's tip: it is drawn, and lightly the arm at its first and last place. --posture stands near the "
-            "first one; needs --tooling.",
+            help="PATH.nc or PATH.csv of the tool's tip: it is drawn, and lightly the arm at its first and last place. "
+            "--posture stands near the first one; needs --tooling.",
             show_default=False,
         ),
     ] = None,
@@ -51,13 +51,14 @@ def draw(
     places: FloatArray | None = None
     ends: list[FloatArray] = []
     if path is not None:
-        from rcsa_ident.io.paths import read_path
+        from rcsa_ident.io.paths import read_tool_path
         from rcsa_ident.workflows.robot_postures import following
 
         if assembly is None:
             raise InputError("--tooling", "nothing", "TOOLING.toml: the path is that of a tool's tip")
-        places, axes = read_path(path)
-        postures = following(arm, angles, places, axes, assembly)
+        along = read_tool_path(path)
+        places = along.places
+        postures = following(arm, angles, along.places, along.axes, assembly)
         ends = [postures[0], postures[-1]]
     write_text(out, arm_svg(arm, angles, assembly, places, ends, (azimuth, elevation)))
     warnings = list(arm.beyond_limits(angles))

@@ -1,0 +1,407 @@
+"""G-code of milling machines: the places that a program leads to, arcs as chords; what is not understood is refused by its line."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from array import array
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from gcodeparser import parse_parameters
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
+from rcsa_ident.io.text_columns import decoded
+from rcsa_ident.toolpath.arcs import centre_of, chord_count, chords, turned
+from rcsa_ident.toolpath.path import RAPID, ToolPath
+from rcsa_ident.units import from_rpm, to_rpm
+
+LARGEST_PROGRAM = 100 * MEGABYTE
+#: Places that a program may lead to, chords of arcs counted; and lines that it may have.
+MOST_PLACES = 2_000_000
+_LONGEST_LINE = 1000
+#: Numbers beyond it are no lengths in a machine [mm].
+_LARGEST_NUMBER = 1e7
+_INCH = 25.4
+
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
+_WORDS = re.compile(rf"(?:[A-Z]{_NUMBER})*")
+_CODES = re.compile(rf"([GM])({_NUMBER})")
+_COMMENT = re.compile(r"\([^()]*\)")
+#: A point that no digit follows: the tokeniser takes it for a whole number and fails.
+_BARE_POINT = re.compile(r"\.(?!\d)")
+_LABEL = re.compile(r"[O:]\d+")
+_NUMBERED = re.compile(r"N\d+\.?")
+
+#: Codes by what they set; of one kind a line has one.
+_KINDS: dict[str, tuple[float, ...]] = {
+    "motion": (0, 1, 2, 3, 80),
+    "plane": (17, 18, 19),
+    "unit": (20, 21),
+    "distance": (90, 91),
+    "centre": (90.1, 91.1),
+    "single": (4, 28, 30, 53),
+    "system": (54, 55, 56, 57, 58, 59),
+    # none of these moves a place: cancelled corrections, a tool's length, exact stops and smoothing, feed per minute, speed in rev/min
+    "told": (5.1, 9, 15, 40, 43, 49, 50, 61, 61.1, 62, 64, 69, 94, 97, 98, 99),
+}
+_KIND = {code: kind for kind, codes in _KINDS.items() for code in codes}
+#: Why codes are refused that would change the path.
+_REFUSED: dict[float, str] = {
+    41: "a path of the tool's centre, written without radius correction",
+    42: "a path of the tool's centre, written without radius correction",
+    93: "feeds per minute, G94",
+    95: "feeds per minute, G94",
+    96: "speeds in rev/min, G97",
+    **dict.fromkeys((73, 74, 76, *range(81, 90)), "moves by G0 to G3 instead of canned cycles"),
+}
+_SUBPROGRAMS = (96, 97, 98, 99)
+_PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+_AXES, _OFFSETS = "XYZ", "IJK"
+_LETTERS = "XYZIJKRFSTHDPQ"
+
+
+def read_gcode(path: str | Path, tolerance: float = 1e-6) -> ToolPath:
+    """Return the path of a program's tool tip.
+
+    G0 to G3 (arcs by I, J, K or R, full circles, helices) in the planes of G17 to G19, millimetres or inches, absolute or incremental,
+    with F, S, T, M3 to M6. A program begins at its zero where its first feed move needs a place that nobody told. G28, G30 and G53 lead
+    where nobody knows: the axes stand from there on where they are told next. M2 and M30 end it.
+
+    Parameters
+    ----------
+    path : path
+    tolerance : float [m]
+        Between arcs and their chords.
+
+    Raises
+    ------
+    InputError
+        Names file and line, for all that would change the path and is not understood: radius correction, canned cycles, macros,
+        subprograms, further axes, a change of the work coordinates.
+    """
+    return gcode_of(decoded(read_bytes(path, "program", LARGEST_PROGRAM), "program", str(path)), str(path), tolerance)
+
+
+def gcode_of(text: str, where: str, tolerance: float = 1e-6) -> ToolPath:
+    """Return the path of a program's text, as `read_gcode` does of a file; `where` is named in the messages.
+
+    Examples
+    --------
+    >>> path = gcode_of("G21 G90 G0 X0 Y0 Z0\\nG1 X90 F3000\\nG91 Y30", "PATH.nc")
+    >>> path.length, path.line.tolist()
+    (0.12, [1, 2, 3])
+    """
+    program = _Program(positive("tolerance", tolerance, "m"))
+    begun = False
+    for number, line in enumerate(io.StringIO(text), start=1):
+        try:
+            if number > MOST_PLACES:
+                raise InputError("lines", f"more than {MOST_PLACES}", f"at most {MOST_PLACES}")
+            block = _block(line)
+            if block == "%":
+                if begun:
+                    break
+                continue
+            begun = begun or bool(block)
+            if block and program.run(block, number):
+                break
+        except InputError as error:
+            raise error.at(f"{where} line {number}") from None
+    return program.path(where)
+
+
+def _block(line: str) -> str:
+    """A line without comments, blanks and its number; empty where it says nothing."""
+    if len(line) > _LONGEST_LINE:
+        raise InputError("line", f"{len(line)} characters", f"at most {_LONGEST_LINE}")
+    text = "".join(_COMMENT.sub(" ", line).partition(";")[0].upper().split())
+    if text.startswith("%"):
+        return "%"
+    slashed = text.startswith("/")
+    text = _NUMBERED.sub("", text.lstrip("/"), count=1) if text[:1] in "/N" else text
+    if _LABEL.fullmatch(text):
+        return ""
+    if any(sign in text for sign in "#[]="):
+        raise InputError("block", text, "numbers: macros are not run")
+    known = _WORDS.match(text)
+    if known is None or known.end() != len(text):
+        rest = text[known.end() if known else 0 :]
+        allowed = "words of a letter and a number with a decimal point, comments in ( ) or behind ;"
+        raise InputError("block", rest, allowed)
+    if slashed and re.search(r"[GXYZIJKRF]", text):
+        raise InputError("block", f"/{text}", "moves that no switch of the control leaves out: take the / or the line away")
+    return "" if slashed else text
+
+
+class _Program:
+    """What a controller remembers from line to line, and the places so far, in millimetres.
+
+    Parameters
+    ----------
+    tolerance : float [m]
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance = tolerance
+        self.at = [math.nan] * 3
+        # which axes G28 or G53 brought where nobody knows, and in which line
+        self.lost: dict[int, int] = {}
+        self.motion: float | None = None
+        self.plane, self.unit = 17.0, 1.0
+        self.absolute, self.absolute_centres = True, False
+        self.system: float | None = None
+        self.feed, self.speed, self.turning = math.nan, math.nan, True
+        self.selected, self.mounted, self.changes = 0, 0, False
+        self.places, self.feeds, self.speeds = array("d"), array("d"), array("d")
+        self.tools, self.lines = array("q"), array("q")
+
+    def run(self, block: str, number: int) -> bool:
+        """Run a line; true where the program ends with it."""
+        codes, told, words = _words(block)
+        self._set(told, codes, words)
+        single = told.get("single")
+        axes = {i: words[letter] * self.unit for i, letter in enumerate(_AXES) if letter in words}
+        offsets = {i: words[letter] * self.unit for i, letter in enumerate(_OFFSETS) if letter in words}
+        if single in (28, 30):
+            self._home(axes, number)
+        elif single == 53:
+            if self.motion != 0:
+                raise InputError("block", "G53 at a feed", "G53 G0: where it leads nobody told")
+            self._leave(axes, number)
+        elif single != 4 and (axes or offsets or "R" in words):
+            self._move(axes, offsets, words.get("R"), number)
+        if 5 in codes["M"]:
+            self.turning = False
+        return bool({2, 30} & set(codes["M"]))
+
+    def _set(self, told: Mapping[str, float], codes: Mapping[str, list[float]], words: Mapping[str, float]) -> None:
+        if "unit" in told:
+            self.unit = _INCH if told["unit"] == 20 else 1.0
+        self.plane = told.get("plane", self.plane)
+        self.absolute = told.get("distance", 90 if self.absolute else 91) == 90
+        self.absolute_centres = told.get("centre", 90.1 if self.absolute_centres else 91.1) == 90.1
+        if "motion" in told:
+            self.motion = None if told["motion"] == 80 else told["motion"]
+        if (system := told.get("system")) is not None:
+            if self.system not in (None, system):
+                raise InputError(
+                    "block", f"G{system:g} after G{self.system:g}", "one system of work coordinates: nobody told how far they are apart"
+                )
+            self.system = system
+        if told.get("single") == 4:  # its words are a time
+            return
+        if "F" in words:
+            self.feed = positive("F", words["F"]) * self.unit
+        if "S" in words:
+            if words["S"] < 0.0:
+                raise InputError("S", words["S"], "0 or more [rev/min]")
+            self.speed = words["S"]
+        if "T" in words:
+            if words["T"] < 0.0 or words["T"] != int(words["T"]):
+                raise InputError("T", words["T"], "the number of a tool")
+            self.selected = int(words["T"])
+        if 6 in codes["M"]:
+            self.mounted, self.changes = self.selected, True
+        if 3 in codes["M"] or 4 in codes["M"]:
+            self.turning = True
+
+    def _move(self, axes: dict[int, float], offsets: dict[int, float], radius: float | None, number: int) -> None:
+        if self.motion is None:
+            raise InputError("block", "axes without a motion", "one of G0 to G3 before them")
+        arc = self.motion in (2, 3)
+        if not arc and (offsets or radius is not None):
+            raise InputError("block", f"I, J, K or R in G{self.motion:g}", "them in arcs, G2 and G3")
+        if self.motion != 0:
+            self._begin(axes, arc, number)
+        target = self._target(axes)
+        if self.motion == 0:
+            # a place is one when all its axes are told; behind G28 they will be
+            if self.lines or not any(map(math.isnan, target)):
+                self._add(target, RAPID, number)
+        elif arc:
+            self._arc(target, offsets, radius, number)
+        else:
+            self._add(target, self.feed, number)
+        self.at = target
+        for i in axes:
+            self.lost.pop(i, None)
+
+    def _begin(self, axes: dict[int, float], arc: bool, number: int) -> None:
+        """See to it that a feed move begins somewhere."""
+        for i, since in self.lost.items():
+            raise InputError(f"{_AXES[i]}", f"no place since line {since} led where nobody knows", f"G0 {_AXES[i]} before the tool feeds")
+        if self.lines:
+            return
+        if arc or any(not math.isnan(v) for v in self.at) or len(axes) < 3 or not self.absolute:
+            self.at = [0.0 if math.isnan(v) else v for v in self.at]
+            self._add(self.at, RAPID, number)
+
+    def _target(self, axes: dict[int, float]) -> list[float]:
+        target = list(self.at)
+        for i, value in axes.items():
+            if self.absolute:
+                target[i] = value
+            elif i in self.lost:
+                raise InputError(_AXES[i], f"a step from where line {self.lost[i]} led to", "a place, by G90")
+            else:
+                target[i] = value + (0.0 if math.isnan(target[i]) else target[i])
+        return target
+
+    def _arc(self, target: list[float], offsets: dict[int, float], radius: float | None, number: int) -> None:
+        u, v, w = plane = _PLANES[int(self.plane)]
+        start, end = (1e-3 * np.array(place) for place in (self.at, target))
+        first, last = (start[u], start[v]), (end[u], end[v])
+        clockwise = self.motion == 2
+        if offsets.get(w):
+            raise InputError(_OFFSETS[w], offsets[w], f"{_OFFSETS[u]} and {_OFFSETS[v]} in the plane of G{self.plane:g}")
+        if (radius is None) == (u not in offsets and v not in offsets):
+            found = "neither centre nor radius" if radius is None else "both centre and radius"
+            raise InputError("arc", found, f"{_OFFSETS[u]} and {_OFFSETS[v]}, or R")
+        if radius is not None:
+            centre = centre_of(first, last, 1e-3 * radius * self.unit, clockwise)
+        elif self.absolute_centres:
+            if u not in offsets or v not in offsets:
+                raise InputError("arc", "half a centre", f"{_OFFSETS[u]} and {_OFFSETS[v]} by G90.1")
+            centre = 1e-3 * offsets[u], 1e-3 * offsets[v]
+        else:
+            centre = first[0] + 1e-3 * offsets.get(u, 0.0), first[1] + 1e-3 * offsets.get(v, 0.0)
+        angle = turned(first, last, centre, clockwise)
+        reach = max(math.hypot(p[0] - centre[0], p[1] - centre[1]) for p in (first, last))
+        count = chord_count(reach, angle, self.tolerance)
+        self._check(count)
+        for place in 1e3 * chords(start, end, centre, plane, angle, count)[:-1]:
+            self._add(place, self.feed, number)
+        self._add(target, self.feed, number)
+
+    def _home(self, axes: dict[int, float], number: int) -> None:
+        """G28 and G30: by way of a place to the reference point of the axes that are told, of all where none is."""
+        if axes:
+            way = self._target(axes)
+            if way != self.at and not any(map(math.isnan, way)):
+                self._add(way, RAPID, number)
+            self.at = way
+        self._leave(axes or dict.fromkeys(range(3), 0.0), number)
+
+    def _leave(self, axes: dict[int, float], number: int) -> None:
+        """Go where nobody knows by the axes that are told."""
+        for i in axes:
+            self.at[i] = math.nan
+            self.lost[i] = number
+        if self.lines and axes:
+            self._add(self.at, RAPID, number)
+
+    def _check(self, count: int) -> None:
+        if len(self.lines) + count > MOST_PLACES:
+            raise InputError(
+                "places", f"more than {MOST_PLACES}", f"at most {MOST_PLACES}, chords of arcs counted: cut it up or allow more"
+            )
+
+    def _add(self, place: list[float] | FloatArray, feed: float, number: int) -> None:
+        self._check(1)
+        self.places.extend(place)
+        self.feeds.append(feed)
+        self.speeds.append(self.speed if self.turning else 0.0)
+        self.tools.append(self.mounted)
+        self.lines.append(number)
+
+    def path(self, where: str) -> ToolPath:
+        """Return the places; axes that were led where nobody knows stand where they are told next."""
+        places = np.array(self.places).reshape(-1, 3)
+        known = ~np.isnan(places)
+        kept = len(places) - int(np.argmax(known[::-1].all(axis=1))) if known.all(axis=1).any() else 0
+        if not kept:
+            raise InputError("program", "no move to a place", "one or more, with X, Y and Z", where)
+        places = places[:kept]
+        for column, told in zip(places.T, known[:kept].T, strict=True):
+            rows = np.flatnonzero(told)
+            column[:] = column[rows[np.searchsorted(rows, np.arange(kept))]]
+        tools = np.array(self.tools) if self.changes else np.full(len(self.lines), self.selected)
+        return ToolPath(
+            1e-3 * places,
+            feed=np.array(self.feeds)[:kept] / 6e4,
+            speed=from_rpm(np.array(self.speeds)[:kept]),
+            tool=tools[:kept],
+            line=np.array(self.lines)[:kept],
+        )
+
+
+def _words(block: str) -> tuple[dict[str, list[float]], dict[str, float], dict[str, float]]:
+    """G and M codes of a line, the G codes by what they set, and its further words."""
+    codes: dict[str, list[float]] = {"G": [], "M": []}
+    for letter, value in _CODES.findall(block):
+        codes[letter].append(float(value))
+    told: dict[str, float] = {}
+    for code in codes["G"]:
+        kind = _KIND.get(code)
+        if kind is None:
+            known = ", ".join(f"G{each:g}" for each in sorted(_KIND))
+            raise InputError("block", f"G{code:g}", _REFUSED.get(code, f"one of {known}"))
+        if kind != "told" and told.setdefault(kind, code) != code:
+            raise InputError("block", f"G{told[kind]:g} and G{code:g}", "one of them in a line")
+    for code in codes["M"]:
+        if code in _SUBPROGRAMS:
+            raise InputError("block", f"M{code:g}", "a program without subprograms and jumps")
+    rest = _CODES.sub("", block)
+    found = parse_parameters(_BARE_POINT.sub("", rest))
+    if len(found) != sum(map(str.isalpha, rest)):
+        raise InputError("block", block, "each word once in a line")
+    for letter, value in found.items():
+        if letter not in _LETTERS:
+            raise InputError("block", f"{letter}{value}", f"words {', '.join(_LETTERS)}, G and M: other axes are not followed")
+        if not abs(float(value)) <= _LARGEST_NUMBER:
+            raise InputError(letter, value, f"at most {_LARGEST_NUMBER:g}")
+    if ("P" in found or "Q" in found) and not (codes["M"] or any(_KIND[code] == "told" or code == 4 for code in codes["G"])):
+        raise InputError("block", block, "P and Q beside G4, G64 or an M word: turns of helices and cycles are not run")
+    return codes, told, {letter: float(value) for letter, value in found.items()}
+
+
+def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4) -> None:
+    """Write a path as a program in millimetres, absolute, feeds per minute; `read_gcode` gives it back, line numbers aside.
+
+    Parameters
+    ----------
+    path : path
+    tool_path : ToolPath
+        With the tool upright.
+    decimals : int
+        Of the places in millimetres.
+
+    Raises
+    ------
+    InputError
+        If the tool leans, or a feed or speed is not told behind one that is: a program would keep the last one.
+    """
+    where = str(path)
+    if np.any(tool_path.axes[:, 2] < 1.0 - 1e-12):
+        raise InputError("axes", "a tool that leans", "an upright one; a table, .csv, has columns i, j, k", where)
+    feeds, speeds = 6e4 * tool_path.feed, to_rpm(tool_path.speed, 9)
+    for name, values in (("feed", feeds[1:]), ("speed", speeds)):
+        values = values[np.isfinite(values) | np.isnan(values)]
+        if np.any(np.isnan(values[1:]) & ~np.isnan(values[:-1])):
+            raise InputError(name, "one that ends on the way", "one for all moves behind the first that has it", where)
+    places = np.round(1e3 * tool_path.places, decimals) + 0.0
+    lines = ["%", "G21 G90 G94 G17"]
+    speed, feed, tool = math.nan, math.nan, 0
+    for place, f, s, t in zip(places.tolist(), feeds.tolist(), speeds.tolist(), tool_path.tool.tolist(), strict=True):
+        if t != tool:
+            lines.append(f"T{t} M6")
+            tool = t
+        if s != speed and not math.isnan(s):
+            lines.append(f"S{_told(s)} M3" if s else "M5")
+            speed = s
+        word = ""
+        if f not in (feed, math.inf) and not math.isnan(f):
+            word, feed = f" F{_told(f)}", f
+        x, y, z = (f"{value:.{decimals}f}" for value in place)
+        lines.append(f"{'G0' if f == math.inf else 'G1'} X{x} Y{y} Z{z}{word}")
+    write_text(path, "\n".join([*lines, "M30", "%"]) + "\n")
+
+
+def _told(value: float) -> str:
+    """A number without an exponent, to the last digit that counts."""
+    return np.format_float_positional(round(value, 9), trim="-")
