@@ -138,6 +138,29 @@ def surface_location_error(
     return SurfaceError(speeds, height, error, side, tuple(_doubts(process, response, speeds, tail)))
 
 
+def forced_vibration(tip: Receptance | TipModes, process: MillingProcess, speed: float, depth: float, instants: int = 256) -> FloatArray:
+    """Return how the tip moves in a stable cut over a revolution, shape (instants, 2) [m], machine axes X and Y.
+
+    By the force lines of a rigid tool; instants are evenly apart, tooth 1 at immersion 0 at the first one.
+
+    Parameters
+    ----------
+    tip : Receptance or TipModes
+    process : MillingProcess
+        With a feed per tooth.
+    speed : float [rad/s]
+    depth : float [m]
+    instants : int
+    """
+    response = _Tip(_from_dc(tip) if isinstance(tip, TipModes) else tip)
+    orders = np.arange(min(int(response.omega[-1] / speed), MOST_ORDERS, instants // 2 - 1) + 1)
+    lines = runout_force_lines if process.cutter.offset else force_lines
+    force = lines(process.cutter, process.conditions(speed, depth), process.coefficients, orders)
+    moved = np.einsum("mrc,mc->mr", response.at(orders * speed), force)
+    angle = 2.0 * np.pi * np.arange(instants) / instants
+    return np.asarray((np.exp(1j * np.outer(angle, orders)) @ moved).real)
+
+
 class _Tip:
     """The tip's receptance between its lines, from 0 Hz."""
 

@@ -15,6 +15,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.teeth import Slices, slices_of
 from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.toolpath import _march_kernels as kernels
@@ -97,6 +98,16 @@ class Carrier:
         motion = np.stack([x - lever * slope_x, y - lever * slope_y, z])
         none = np.zeros_like(springs)
         return cls(structure.mass, structure.damping, springs, motion, none if play is None else play, none if load is None else load)
+
+    @property
+    def poles(self) -> PoleResidue:
+        """Its freedoms without their play as modes of the tip, 3 by 3."""
+        n = self.stiffness.size
+        zero, compliance = np.zeros((n, n)), np.linalg.inv(self.mass)
+        rates = np.block([[zero, np.eye(n)], [-compliance * self.stiffness, -compliance @ self.damping]])
+        pushed = np.concatenate([np.zeros((n, 3)), compliance @ self.motion.T])
+        moved = np.concatenate([self.motion, np.zeros((3, n))], axis=1)
+        return PoleResidue.from_state_space(StateSpace(rates, pushed, moved, np.zeros((3, 3))))
 
     @property
     def rest(self) -> FloatArray:

@@ -1,0 +1,291 @@
+"""path stability, path mill: how a machine or a robot cuts along a path."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.conditions import subjects_of
+from rcsa_ident.cli.options import TipOptions, takes_groups
+from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
+from rcsa_ident.cli.robot import is_robot, posed_robot
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.units import from_rpm, to_hz, to_rpm
+
+if TYPE_CHECKING:
+    from rcsa_ident.machine.machine import TipSource
+    from rcsa_ident.machining_setup import CutSpec, Tooling
+    from rcsa_ident.toolpath.dexel import DexelField
+    from rcsa_ident.toolpath.path import ToolPath
+    from rcsa_ident.workflows.path_milling import PathMilling
+    from rcsa_ident.workflows.path_stability import CutsAlong
+    from rcsa_ident.workflows.tool_change import ToolChange
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="[MACHINE] TOOLING.toml PATH",
+        help="RESULT.json, FLANGE.csv, or ROBOT.toml with --posture; with --modes or --frf none. PATH.nc is G-code, PATH.csv a table.",
+        show_default=False,
+    ),
+]
+Posture = Annotated[
+    str | None, typer.Option(metavar="'Q1 Q2 ...'", help="Of a robot: angles near those of the first place, degrees.", show_default=False)
+]
+Speed = Annotated[float | None, typer.Option(help="Spindle speed, rev/min, where the path has none.", show_default=False)]
+Material = Annotated[str | None, typer.Option(help="Coefficients of a material of the library.", show_default=False)]
+Ktc = Annotated[float | None, typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False)]
+Krc = Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)]
+Kac = Annotated[float | None, typer.Option(help="Axial ratio; default: the result's workpiece, or 0.", show_default=False)]
+
+
+@answers
+@takes_groups
+def stability(
+    files: Files,
+    stock: Stock,
+    out: Annotated[Path, typer.Option(help="STABILITY.csv to write: a row for every move that cuts.", show_default=False)],
+    tip: TipOptions,
+    posture: Posture = None,
+    speed_rpm: Speed = None,
+    material: Material = None,
+    ktc_mpa: Ktc = None,
+    krc: Krc = None,
+    kac: Kac = None,
+    cell_mm: CellMm = None,
+    step_mm: StepMm = None,
+    method: Annotated[MethodName, typer.Option(help="Stability method.")] = MethodName.FULL_DISCRETISATION,
+    bands: Annotated[bool, typer.Option(help="Draw machines from what is left open of this one.")] = True,
+    plot: Annotated[
+        Path | None, typer.Option(help="PART.png or .svg: the part coloured by the margin to chatter.", show_default=False)
+    ] = None,
+    plot_error: Annotated[
+        Path | None, typer.Option(help="PART.png or .svg: the part coloured by how far its walls are off.", show_default=False)
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Tell on every move of a path how far the cut is from chatter, its force, how the tip moves, and where it leaves the wall."""
+    import numpy as np
+
+    from rcsa_ident.io.path_tables import place_columns, write_columns
+    from rcsa_ident.workflows.path_removal import remove_along
+    from rcsa_ident.workflows.path_stability import cuts_along, described, stations_along
+
+    for written, option in ((out, "--out"), (plot, "--plot"), (plot_error, "--plot-error")):
+        if written is not None:
+            writable(written, option)
+    machine, tooling, path = _subjects(files, tip, posture)
+    change = _change(machine, tooling, _cut(material, ktc_mpa, krc, kac), speed_rpm, method, bands)
+    stages = Stages(quiet=json_)
+    with stages.stage("removal") as line:
+        removal = remove_along(tooling, path, *stock_of(stock), metres("--cell-mm", cell_mm), metres("--step-mm", step_mm), line)
+    with stages.stage("stability") as line:
+        found = cuts_along(change, removal.path, removal.engagement, stations_along(machine, tooling, removal.path), line)
+    way, cutting = removal.path, np.flatnonzero(found.cutting)
+    force = _machine_axes(found, way)
+    columns = place_columns(way.places[1:][cutting])
+    columns |= {
+        "line": way.line[1:][cutting],
+        "depth_mm": 1e3 * found.depth[cutting],
+        "spindle_speed_rpm": to_rpm(found.speed[cutting], 9),
+        "feed_per_tooth_mm": 1e3 * found.feed_per_tooth[cutting],
+        "margin": found.margin[cutting],
+        "margin_low": found.margin_low[cutting],
+        "limit_depth_mm": 1e3 * found.limit[cutting],
+        "chatter_frequency_hz": to_hz(found.chatter_frequency[cutting]),
+        "force_x_n": force[cutting, 0],
+        "force_y_n": force[cutting, 1],
+        "force_z_n": force[cutting, 2],
+        "peak_force_n": found.peak_force[cutting],
+        "deflection_um": 1e6 * found.deflection[cutting],
+        "form_error_um": 1e6 * found.form_error[cutting],
+    }
+    write_columns(out, columns)
+    _plots(removal.part, way, found, plot, plot_error)
+    warnings = [*removal.warnings, *tooling.remarks, *machine.remarks, *found.warnings]
+    if json_:
+        emit(_summary(found, way) | {"warnings": warnings, "seconds": stages.seconds, "out": str(out)})
+        return
+    say(described(found, way))
+    if cutting.size:
+        say(
+            f"forces up to {np.nanmax(found.peak_force):.0f} N across the tool's axis; {found.groups} different cuts on {cutting.size} moves"
+        )
+    errors = found.form_error[np.isfinite(found.form_error)]
+    if errors.size:
+        say(f"walls are off by {1e6 * errors.min():.1f} to {1e6 * errors.max():.1f} µm; above 0 material is left")
+    for each in warnings:
+        warn(each)
+    say(f"written: {', '.join(str(each) for each in (out, plot, plot_error) if each is not None)} ({sum(stages.seconds.values()):.1f} s)")
+
+
+@answers
+@takes_groups
+def mill(
+    files: Files,
+    stock: Stock,
+    out: Annotated[Path, typer.Option(help="FORCES.csv to write: a row for every turn of the tool in material.", show_default=False)],
+    tip: TipOptions,
+    posture: Posture = None,
+    speed_rpm: Speed = None,
+    material: Material = None,
+    ktc_mpa: Ktc = None,
+    krc: Krc = None,
+    kac: Kac = None,
+    cell_mm: CellMm = None,
+    steps: Annotated[int, typer.Option(help="Instants of a turn.", min=60, max=20000)] = 360,
+    play: Annotated[bool, typer.Option("--play/--no-play", help="With the play of a robot's drives.")] = True,
+    surface: Annotated[Path | None, typer.Option(help="SURFACE.csv to write: the walls that are left.", show_default=False)] = None,
+    cutoff_mm: Annotated[float, typer.Option(help="Of the Gaussian filter (ISO 16610-21) for Ra, Rq and Rt.")] = 0.8,
+    json_: Json = False,
+) -> None:
+    """Mill along a path in time: chips, forces and vibrations instant by instant, and the walls that they leave."""
+    from rcsa_ident.io.path_tables import place_columns, write_columns
+    from rcsa_ident.workflows.path_milling import mill_path
+    from rcsa_ident.workflows.path_removal import field_of
+
+    writable(out)
+    if surface is not None:
+        writable(surface, "--surface")
+    machine, tooling, path = _subjects(files, tip, posture)
+    change = _change(machine, tooling, _cut(material, ktc_mpa, krc, kac), speed_rpm, MethodName.ZERO_ORDER, False)
+    field = field_of(tooling, *stock_of(stock), metres("--cell-mm", cell_mm))
+    stages = Stages(quiet=json_)
+    with stages.stage("milling") as line:
+        found = mill_path(change, path, field, steps, play, 1e-3 * positive("--cutoff-mm", cutoff_mm, "mm"), line)
+    columns = {"time_s": found.time} | place_columns(found.places)
+    columns |= {f"force_{axis}_n": found.mean_force[:, k] for k, axis in enumerate("xyz")}
+    columns |= {"peak_force_n": found.peak_force}
+    columns |= {f"deflection_{axis}_um": 1e6 * found.mean_tip[:, k] for k, axis in enumerate("xyz")}
+    columns |= {"swing_um": 1e6 * found.swing, "beside_turns_um": 1e6 * found.beside_turns, "line": path.line[1:][found.move]}
+    write_columns(out, columns)
+    if surface is not None:
+        write_columns(surface, _surface_columns(found, path))
+    if json_:
+        emit(_mill_summary(found, path) | {"seconds": stages.seconds, "out": str(out)})
+        return
+    say(found.described(path))
+    for remark in found.warnings:
+        warn(remark)
+    written = ", ".join(str(each) for each in (out, surface) if each is not None)
+    say(f"written: {written} ({found.time.size} turns, {stages.seconds['milling']:.1f} s)")
+
+
+def _subjects(files: list[Path], tip: TipOptions, posture: str | None) -> tuple[TipSource, Tooling, ToolPath]:
+    """The machine, the tooling and the path that a command line names."""
+    from rcsa_ident.io.paths import read_tool_path
+    from rcsa_ident.io.setups import read_tooling
+
+    if len(files) < 2:
+        raise InputError("files", f"{len(files)} files", "a machine, a tooling and a path; with --modes or --frf a tooling and a path")
+    *subjects, path = files
+    robot = len(subjects) == 2 and is_robot(subjects[0])
+    if robot != (posture is not None):
+        allowed = "the angles of a robot near the first place" if robot else "none: a machine has no joints to turn"
+        raise InputError("--posture", "nothing" if posture is None else posture, allowed)
+    if robot and posture is not None:
+        return posed_robot(subjects[0], posture, False), read_tooling(subjects[1]), read_tool_path(path)
+    machine, toolings = subjects_of(subjects, tip)
+    return machine, toolings[0], read_tool_path(path)
+
+
+def _cut(material: str | None, ktc_mpa: float | None, krc: float | None, kac: float | None) -> CutSpec:
+    from rcsa_ident.machining_setup import CutSpec
+
+    given = {} if ktc_mpa is None else {"tangential": ktc_mpa * 1e6}
+    given |= {} if krc is None else {"radial_ratio": krc}
+    given |= {} if kac is None else {"axial_ratio": kac}
+    return CutSpec(material=material, coefficients=given)
+
+
+def _change(machine: TipSource, tooling: Tooling, cut: CutSpec, speed_rpm: float | None, method: MethodName, bands: bool) -> ToolChange:
+    import numpy as np
+
+    from rcsa_ident.stability.lobes import DRAWS
+    from rcsa_ident.stability.methods import METHODS
+    from rcsa_ident.workflows.tool_change import ToolChange
+
+    # nothing is asked of the depth: every move has its own
+    speeds = np.zeros(0) if speed_rpm is None else np.array([from_rpm(positive("--speed-rpm", speed_rpm, "rev/min"))])
+    change = ToolChange(machine, tooling, cut, speeds, 1.0, METHODS[method](), DRAWS if bands else 0)
+    _ = change.process  # coefficients that are not known are said before anything is computed
+    return change
+
+
+def _machine_axes(found: CutsAlong, path: ToolPath) -> Any:
+    """Mean forces of moves along X, Y and the tool's axis."""
+    import numpy as np
+
+    way = np.arctan2(path.moves[:, 1], path.moves[:, 0])
+    c, s = np.cos(way), np.sin(way)
+    x, y, z = found.mean_force.T
+    return np.column_stack([c * x - s * y, s * x + c * y, z])
+
+
+def _summary(found: CutsAlong, path: ToolPath) -> dict[str, Any]:
+    import numpy as np
+
+    cutting = np.flatnonzero(found.cutting)
+    data: dict[str, Any] = {"moves": len(path) - 1, "cutting_moves": int(cutting.size), "different_cuts": found.groups}
+    if not cutting.size:
+        return data
+    worst = int(cutting[np.argmin(found.margin_low[cutting])])
+    errors = found.form_error[np.isfinite(found.form_error)]
+    return data | {
+        "chattering_moves": int(np.count_nonzero(found.margin_low[cutting] < 1.0)),
+        "least_margin": float(found.margin[worst]),
+        "least_margin_low": float(found.margin_low[worst]),
+        "at_mm": (1e3 * path.places[worst + 1]).tolist(),
+        "at_line": int(path.line[worst + 1]) or None,
+        "largest_force_n": float(np.nanmax(found.peak_force)),
+        "largest_deflection_um": 1e6 * float(np.nanmax(found.deflection, initial=-math.inf)),
+        "form_error_um": [1e6 * float(errors.min()), 1e6 * float(errors.max())] if errors.size else None,
+    }
+
+
+def _mill_summary(found: PathMilling, path: ToolPath) -> dict[str, Any]:
+    import numpy as np
+
+    rough = found.roughness
+    return {
+        "turns": int(found.time.size),
+        "largest_force_n": float(np.max(found.peak_force, initial=0.0)),
+        "largest_deflection_um": 1e6 * float(np.max(np.linalg.norm(found.mean_tip, axis=1), initial=0.0)),
+        "chattering_lines": sorted({int(path.line[k + 1]) for k in found.chattering}),
+        "status": found.status,
+        "roughness_um": None
+        if rough is None
+        else {"ra": 1e6 * rough.mean, "rq": 1e6 * rough.rms, "rt": 1e6 * rough.total, "cutoff_mm": 1e3 * rough.cutoff},
+        "form_error_um": None if found.form_error is None else [1e6 * each for each in found.form_error],
+        "warnings": list(found.warnings),
+    }
+
+
+def _surface_columns(found: PathMilling, path: ToolPath) -> dict[str, Any]:
+    table = found.surface
+    names = ("x_mm", "y_mm", "z_mm", "height_mm")
+    columns = dict(zip(names, (1e3 * table[:, :4]).round(6).T, strict=True))
+    return columns | {"error_um": 1e6 * table[:, 4], "line": path.line[1:][table[:, 5].astype(int)]}
+
+
+def _plots(part: DexelField, path: ToolPath, found: CutsAlong, margin: Path | None, error: Path | None) -> None:
+    """Draw the part coloured by what each move did to it."""
+    if margin is None and error is None:
+        return
+    from rcsa_ident.report.part import save_coloured_part
+
+    for file, values, label, limits in (
+        (margin, found.margin_low, "margin to chatter", (0.0, 2.0)),
+        (error, 1e6 * found.form_error, "form error of the wall [µm]", None),
+    ):
+        if file is not None:
+            save_coloured_part(file, part, path, values, label, limits)
+
+
+#: By their names on the command line.
+COMMANDS: dict[str, Any] = {"stability": stability, "mill": mill}

@@ -1,0 +1,296 @@
+"""Milling in time along a path on any machine: what carries the tool, what happens turn by turn, and the walls that are left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.machine.machine import TipSource
+from rcsa_ident.machine.robot.posed_robot import PosedRobot
+from rcsa_ident.stability.lobes import all_directions
+from rcsa_ident.stability.tip_modes import TipModes, fitted_modes
+from rcsa_ident.toolpath.dexel import DexelField
+from rcsa_ident.toolpath.march import Carrier
+from rcsa_ident.toolpath.path import ToolPath
+from rcsa_ident.toolpath.path_march import MarchOptions, MilledPart, mill_along
+from rcsa_ident.toolpath.removal import Sweep
+from rcsa_ident.toolpath.surface import Roughness, roughness
+from rcsa_ident.toolpath.walls import PathFrame, Walls
+from rcsa_ident.workflows.path_removal import solid_of
+from rcsa_ident.workflows.path_stability import stations_along
+from rcsa_ident.workflows.robot_milling import arm_carrier
+from rcsa_ident.workflows.tool_change import ToolChange
+
+#: Share of its swing by which a tip that chatters stands elsewhere after a turn, what counts as standing still [m], and turns that tell.
+_ELSEWHERE, _STILL, _FEWEST = 0.2, 5e-7, 6
+#: Between places of walls that are told [m].
+_SURFACE = 2e-5
+_ROWS = ("time", "places", "mean_force", "peak_force", "mean_tip", "once", "swing")
+_NO_WALLS = Walls(0.0, 1.0, np.zeros((2, 0, 0)), np.zeros((2, 0, 0)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathMilling:
+    """What happened along a path, turn by turn in material; axes of the machine, of a robot those of its base.
+
+    Parameters
+    ----------
+    move : array of int, shape (n,)
+        That each turn belongs to.
+    time : array, shape (n,) [s]
+    places : array, shape (n, 3) [m]
+        Where the tip was sent.
+    mean_force : array, shape (n, 3) [N]
+        On the tool.
+    peak_force : array, shape (n,) [N]
+        Across the axis.
+    mean_tip : array, shape (n, 3) [m]
+        By which the tip was off.
+    swing : array, shape (n,) [m]
+        From end to end of its way in a turn, across the axis.
+    beside_turns : array, shape (n,) [m]
+        By which the tip stands elsewhere than a turn before.
+    surface : array, shape (m, 6)
+        Of the walls: place (3) and height above the tip [m], error [m], positive where material is left, and move.
+    roughness : Roughness or None
+        Of the roughest wall that is long enough.
+    lost : bool
+        Whether the tool was ever so far off its path that nothing after it counts.
+    unsettled : int
+        Instants at which force and deflection did not agree.
+    """
+
+    move: np.ndarray
+    time: FloatArray
+    places: FloatArray
+    mean_force: FloatArray
+    peak_force: FloatArray
+    mean_tip: FloatArray
+    swing: FloatArray
+    beside_turns: FloatArray
+    surface: FloatArray
+    roughness: Roughness | None
+    lost: bool
+    unsettled: int
+
+    @property
+    def chattering(self) -> tuple[int, ...]:
+        """Moves whose tip does not come back to where it was a turn before, as a rule by more than `_ELSEWHERE` of its swing."""
+        found = []
+        for move in np.unique(self.move):
+            own = self.move == move
+            if np.count_nonzero(own) >= _FEWEST:
+                beside = float(np.median(self.beside_turns[own]))
+                if beside > max(_ELSEWHERE * float(np.median(self.swing[own])), _STILL):
+                    found.append(int(move))
+        return tuple(found)
+
+    @property
+    def status(self) -> str:
+        """``stable``, ``chatter``, ``no cut``, ``lost``, or ``not converged``."""
+        if self.lost:
+            return "lost"
+        if self.unsettled:
+            return "not converged"
+        if not np.any(self.peak_force > 0.0):
+            return "no cut"
+        return "chatter" if self.chattering else "stable"
+
+    @property
+    def form_error(self) -> tuple[float, float] | None:
+        """Smallest and largest error of the walls [m]; None where none is left."""
+        error = self.surface[:, 4]
+        return (float(error.min()), float(error.max())) if error.size else None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What speaks against it."""
+        told = []
+        if self.lost:
+            told.append("the tool left its path by more than a tenth of its radius: what follows means nothing")
+        if self.unsettled:
+            told.append(f"at {self.unsettled} instants force and deflection did not agree: take more steps a turn")
+        return tuple(told)
+
+    def described(self, path: ToolPath) -> str:
+        """Return it in sentences."""
+        if self.status == "no cut":
+            return "nothing is cut: the tool meets no material on a level move at a feed"
+        bent = 1e6 * float(np.max(np.linalg.norm(self.mean_tip, axis=1)))
+        told = [
+            f"forces up to {self.peak_force.max():.0f} N across the tool's axis, its tip off by up to {bent:.1f} µm on average of a turn"
+        ]
+        lines = sorted({int(path.line[move + 1]) for move in self.chattering})
+        if lines:
+            where = f"on {len(self.chattering)} moves" + (f", lines {', '.join(map(str, lines[:8]))}" if any(lines) else "")
+            told.append(f"it chatters {where}{' and others' if len(lines) > 8 else ''}")
+        else:
+            told.append("no move chatters")
+        if self.form_error is not None:
+            low, high = (1e6 * each for each in self.form_error)
+            told.append(f"walls are off by {low:.1f} to {high:.1f} µm; above 0 material is left")
+        if self.roughness is not None:
+            r = self.roughness
+            told.append(
+                f"Ra {1e6 * r.mean:.2g}, Rq {1e6 * r.rms:.2g}, Rt {1e6 * r.total:.2g} µm on the roughest wall (ISO 21920-2, Gaussian "
+                f"filter ISO 16610-21 of {1e3 * r.cutoff:g} mm, over {1e3 * r.length:.1f} mm)"
+            )
+        return "\n".join(told)
+
+
+def mill_path(
+    change: ToolChange,
+    path: ToolPath,
+    field: DexelField,
+    steps: int = 360,
+    play: bool = True,
+    cutoff: float = 0.8e-3,
+    progress: Callable[[int, int], None] | None = None,
+) -> PathMilling:
+    """Mill along a path in time.
+
+    Parameters
+    ----------
+    change : ToolChange
+        The tooling on its machine, and the material; where the path has no spindle speed its only one counts.
+    path : ToolPath
+    field : DexelField
+        The stock; it is cut.
+    steps : int
+        Of a turn, at least; more where modes swing fast.
+    play : bool
+        With the play of a robot's drives.
+    cutoff : float [m]
+        Of the filter for roughness.
+    progress : callable, optional
+        Told how far along the path it is, in tenths of a millimetre.
+
+    Raises
+    ------
+    InputError
+        If a move at a feed has no spindle speed, or the robot does not reach a place.
+    """
+    tooling = change.tooling
+    if change.speeds.size == 1:
+        untold = ~(path.speed > 0.0)
+        path = replace(path, speed=np.where(untold, change.speeds[0], path.speed))
+    stations = stations_along(change.machine, tooling, path)
+    carriers = carriers_of(change, lambda move: stations(move).machine, path.speed[1:], play)
+    sweep = Sweep(field, solid_of(tooling), path)
+    done = np.concatenate([[0.0], np.cumsum(path.lengths)])
+    parts, surfaces, worst = [], [], None
+    for part in mill_along(sweep, tooling.cutter, change.process.coefficients, carriers, MarchOptions(steps)):
+        parts.append(part)
+        for side, x, error in part.surfaces():
+            surfaces.append(_surface_rows(part, side, x, error))
+            if x[-1] - x[0] > 2.5 * cutoff:
+                found = roughness(error[len(error) // 2], part.walls.spacing, cutoff)
+                worst = found if worst is None or found.mean > worst.mean else worst
+        # walls take far more memory than what is told of a turn
+        parts[-1] = replace(part, walls=_NO_WALLS)
+        if progress is not None:
+            progress(int(1e4 * done[part.move + 1]), int(1e4 * done[-1]))
+    rows = [np.concatenate([getattr(part, name) for part in parts]) if parts else np.zeros((0, 3)) for name in _ROWS]
+    time, places, mean_force, peak_force, mean_tip, once, swing = rows
+    move = np.repeat([part.move for part in parts], [part.time.size for part in parts]) if parts else np.zeros(0, dtype=int)
+    beside = np.linalg.norm(np.diff(once, axis=0, prepend=once[:1]), axis=1)
+    # a tool that has been at rest since stands elsewhere for another reason
+    beside[np.diff(time, prepend=time[:1]).ravel() > 1.5 * np.median(np.diff(time)) if time.size > 1 else slice(0)] = 0.0
+    return PathMilling(
+        move,
+        time.ravel(),
+        places,
+        mean_force,
+        peak_force.ravel(),
+        mean_tip,
+        swing.ravel(),
+        beside,
+        np.concatenate(surfaces) if surfaces else np.zeros((0, 6)),
+        worst,
+        any(part.lost for part in parts),
+        sum(part.unsettled for part in parts),
+    )
+
+
+def _surface_rows(part: MilledPart, side: int, x: FloatArray, error: FloatArray) -> FloatArray:
+    """Rows of `PathMilling.surface`, every fiftieth of a millimetre."""
+    every = max(round(_SURFACE / part.walls.spacing), 1)
+    x, error = x[::every], error[:, ::every]
+    slices, count = error.shape
+    off = (-1.0 if side == 0 else 1.0) * (part.radii[:, None] - error)
+    beside = np.stack([np.broadcast_to(x, error.shape), off], axis=-1).reshape(-1, 2)
+    places = part.frame.back(beside)
+    height = np.repeat(part.heights, count)
+    tip = part.level
+    return np.column_stack([places, tip + height, height, error.ravel(), np.full(slices * count, part.move)])
+
+
+def carriers_of(
+    change: ToolChange, stations: Callable[[int], TipSource], speeds: FloatArray, play: bool = True
+) -> Callable[[int, PathFrame], Carrier]:
+    """Return who carries a tool on the moves of a path, as `toolpath.path_march.mill_along` asks for it.
+
+    Parameters
+    ----------
+    change : ToolChange
+        The tooling.
+    stations : callable
+        The machine of a move; a robot's tip has the base's x and y.
+    speeds : array, shape (k,) [rad/s]
+        Of the spindle on each move.
+    play : bool
+        With the play of a robot's drives.
+    """
+    known: dict[tuple[int, float], Carrier] = {}
+
+    def carrier(move: int, frame: PathFrame) -> Carrier:
+        machine, speed = stations(move), float(speeds[move])
+        key = id(machine), speed
+        if key not in known:
+            known[key] = _carrier(replace(change, machine=machine, speeds=np.array([speed])), play)
+        return seen_from(known[key], frame)
+
+    return carrier
+
+
+def seen_from(carrier: Carrier, frame: PathFrame) -> Carrier:
+    """Return a carrier of the machine's axes in those of a path."""
+    turn = np.eye(3)
+    turn[:2, :2] = frame.turn
+    modes = carrier.modes
+    if modes is not None:
+        modes = PoleResidue(modes.pole, turn @ modes.outputs, modes.inputs @ turn.T, turn @ modes.constant @ turn.T)
+    return replace(carrier, motion=turn @ carrier.motion, modes=modes)
+
+
+def tip_modes(change: ToolChange) -> PoleResidue:
+    """Return the tip's modes along X, Y and Z, 3 by 3; a direction that is not known is rigid."""
+    ((_, tip),) = change.tips(change.speeds)
+    modes = tip if isinstance(tip, TipModes) else fitted_modes(all_directions(tip))[0]
+    count = min(modes.directions, 3)
+    outputs, inputs, constant = (
+        np.zeros((3, modes.pole.size), dtype=complex),
+        np.zeros((modes.pole.size, 3), dtype=complex),
+        np.zeros((3, 3)),
+    )
+    outputs[:count], inputs[:, :count], constant[:count, :count] = (
+        modes.outputs[:count],
+        modes.inputs[:, :count],
+        modes.constant[:count, :count],
+    )
+    return PoleResidue(modes.pole, outputs, inputs, constant)
+
+
+def _carrier(change: ToolChange, play: bool) -> Carrier:
+    machine, modes = change.machine, tip_modes(change)
+    if not (play and isinstance(machine, PosedRobot) and any(joint.backlash for joint in machine.robot.model.joints)):
+        return Carrier(modes=modes)
+    # the arm by its freedoms, for their play; modes tell what tool and spindle add to it
+    assembly = machine.fitted(change.tooling).assembly
+    arm = arm_carrier(machine.robot, machine.angles, machine.turn, assembly.stickout + assembly.holder_length)
+    alone = arm.poles
+    return replace(arm, modes=PoleResidue.joined([modes, PoleResidue(alone.pole, -alone.outputs, alone.inputs, alone.constant)]))
