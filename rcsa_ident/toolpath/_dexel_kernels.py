@@ -473,37 +473,3 @@ def cut_leaning(seg, count, axes, lattice, frame, tip, outline, told):
                     return False
                 told[along] += taken
     return True
-
-
-@numba.njit(cache=True)
-def _nearest_end(seg, count, m, n, which, place):
-    """Distance from a place to the nearest end of this sense on a line that may lie outside."""
-    found = np.inf
-    if 0 <= m < seg.shape[0] and 0 <= n < seg.shape[1]:
-        for k in range(count[m, n]):
-            found = min(found, abs(seg[m, n, k, which] - place))
-    return found
-
-
-@numba.njit(cache=True)
-def nodes_and_rest(seg, count, origin, cell, cell_one, cell_two):
-    """Return how many nodes lie in the material of a grid, and what the surface encloses beside their cells, in cells.
-
-    What lies between a line's last node in the material and its end is known exactly, less the half of a cell that counts with the node.
-    Each part of the surface is seen by all grids; how much each grid's word counts is the square of the cosine between its lines and the
-    surface's normal, which the ends of the lines beside tell. The three words together have the weight 1.
-    """
-    nodes, rest = 0, 0.0
-    for m in range(seg.shape[0]):
-        for n in range(seg.shape[1]):
-            for k in range(count[m, n]):
-                low, high = (seg[m, n, k, 0] - origin) / cell, (seg[m, n, k, 1] - origin) / cell
-                first, last = math.ceil(low), math.floor(high)
-                nodes += int(last - first) + 1
-                for which in range(2):
-                    beyond = (high - last if which == 1 else first - low) - 0.5
-                    place = seg[m, n, k, which]
-                    one = min(_nearest_end(seg, count, m - 1, n, which, place), _nearest_end(seg, count, m + 1, n, which, place)) / cell_one
-                    two = min(_nearest_end(seg, count, m, n - 1, which, place), _nearest_end(seg, count, m, n + 1, which, place)) / cell_two
-                    rest += beyond / (1.0 + one * one + two * two)
-    return nodes, rest

@@ -9,8 +9,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Shown
-from rcsa_ident.toolpath._dexel_kernels import nodes_and_rest
-from rcsa_ident.toolpath._surface_kernels import crossings, occupied, segments_between, surface_net
+from rcsa_ident.toolpath._surface_kernels import crossings, nodes_and_rest, occupied, segments_between, surface_net
 
 #: Of each grid the axis of its lines and those of its two indices.
 GRIDS = ((0, 2, 1), (1, 2, 0), (2, 0, 1))
@@ -57,7 +56,7 @@ class DexelField(Shown):
 
     Examples
     --------
-    A block of 40 x 20 x 10 mm, and what is left of it without its lower half:
+    A block of 40 x 20 x 10 mm:
 
     >>> block = DexelField.block([0.0, 0.0, 0.0], [0.04, 0.02, 0.01], cell=0.5e-3)
     >>> block.shape, round(1e9 * block.volume, 6)

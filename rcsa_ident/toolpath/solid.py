@@ -40,8 +40,8 @@ class ToolSolid(Shown):
 
     >>> from rcsa_ident.cutting.profile import Profile
     >>> solid = ToolSolid.of(Cutter(2, 0.012, profile=Profile.bull_nose(0.012, 0.002, length=0.02)), length=0.04)
-    >>> round(1e3 * solid.radius, 6), solid.length, solid.edge, solid.rises_to_one_peak
-    (6.0, 0.04, 0.02, True)
+    >>> round(1e3 * solid.radius, 6), solid.length, round(1e3 * solid.edge, 6), solid.convex
+    (6.0, 0.04, 20.0, True)
     """
 
     heights: FloatArray
