@@ -149,6 +149,12 @@ class ToolSolid(Shown):
         """Return the radius at heights above the tip [m]; 0 where the tool does not reach."""
         return np.interp(height, self.heights, self.radii, left=0.0, right=0.0)
 
+    def slope_at(self, height: FloatArray) -> FloatArray:
+        """Return by how much the radius grows with the height, at heights above the tip."""
+        k = np.clip(np.searchsorted(self.heights, height, side="right") - 1, 0, self.heights.size - 2)
+        rise = self.heights[k + 1] - self.heights[k]
+        return np.divide(self.radii[k + 1] - self.radii[k], rise, out=np.zeros_like(rise), where=rise > 0.0)
+
     def coarser(self, chord: float) -> ToolSolid:
         """Return the same with as few points as leave it within a distance [m]."""
         kept, last = [0], self.heights.size - 1
