@@ -110,7 +110,9 @@ class PathEngagement(Shown):
         return f"{self.move.size} arcs on {cutting} of {self.volume.size} moves, {1e9 * float(self.volume.sum()):.4g} mm³"
 
 
-def engagement_along(sweep: Sweep, progress: Callable[[int, int], None] | None = None) -> PathEngagement:
+def engagement_along(
+    sweep: Sweep, progress: Callable[[int, int], None] | None = None, look: Callable[[int], None] | None = None
+) -> PathEngagement:
     """Return the engagement on all moves of a sweep, which is run: before each move it is found, then the move is made.
 
     Parameters
@@ -119,6 +121,8 @@ def engagement_along(sweep: Sweep, progress: Callable[[int, int], None] | None =
         Fresh; its field is cut.
     progress : callable or None
         Called with how many of how many moves are done.
+    look : callable or None
+        Called with the number of each move before it is made.
 
     Notes
     -----
@@ -155,6 +159,8 @@ def engagement_along(sweep: Sweep, progress: Callable[[int, int], None] | None =
             extent[move] = ends
             if held:
                 found.append((move, _within_a_turn(rows[:held])))
+        if look is not None:
+            look(move)
         sweep.run(move, move + 1, been=move > 0)
         if progress is not None and (move % 100 == 99 or move == moves - 1):
             progress(move + 1, moves)

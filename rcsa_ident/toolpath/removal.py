@@ -11,6 +11,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Shown
 from rcsa_ident.toolpath._dexel_kernels import cut_leaning, sweep_upright
+from rcsa_ident.toolpath._engagement_kernels import distance_at
 from rcsa_ident.toolpath.dexel import GRIDS, DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.solid import ToolSolid
@@ -102,6 +103,16 @@ class Sweep(Shown):
                 for move in range(start, behind):
                     self._run_leaning(move)
             start, been = behind, True
+
+    def stands_in(self, tip: FloatArray, axis: FloatArray, radius: float, height: float) -> bool:
+        """Return whether the rim of a disc about the tool's axis, at a height above its tip, is anywhere in material."""
+        field, frame = self.field, frame_of(axis)
+        for angle in np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False):
+            point = tip + frame @ np.array([radius * np.cos(angle), radius * np.sin(angle), height])
+            # the distance says how deep it stands, half a cell of doubt aside
+            if distance_at(field.segs, field.counts, field.lattice, *point) > 0.5 * float(field.cell.max()):
+                return True
+        return False
 
     def _run_upright(self, start: int, stop: int, been: bool) -> None:
         field, outline = self.field, self.solid.outline
