@@ -39,45 +39,6 @@ def _holds(seg, count, m, n, place):
 
 
 @numba.njit(cache=True)
-def material_ahead(seg, count, lattice, tip, outline, edge):
-    """Return between which heights above its tip an upright tool has material within a cell of its edges.
-
-    Thin chips stand between the lines: what is beside them tells of them. Where there is none, the first height is above the second.
-    """
-    origin, cell = lattice[0], lattice[1]
-    beside = max(cell[0], cell[1])
-    radius = np.max(outline[1]) + beside
-    low, high = np.inf, -np.inf
-    first = max(math.ceil((tip[0] - radius - origin[0]) / cell[0]), 0)
-    last = min(math.floor((tip[0] + radius - origin[0]) / cell[0]), seg.shape[0] - 1)
-    begin = max(math.ceil((tip[1] - radius - origin[1]) / cell[1]), 0)
-    end = min(math.floor((tip[1] + radius - origin[1]) / cell[1]), seg.shape[1] - 1)
-    for m in range(first, last + 1):
-        for n in range(begin, end + 1):
-            away = math.sqrt((origin[0] + m * cell[0] - tip[0]) ** 2 + (origin[1] + n * cell[1] - tip[1]) ** 2)
-            if away >= radius:
-                continue
-            away = max(away - beside, 0.0)
-            for s in range(count[m, n]):
-                start, stop = max(seg[m, n, s, 0] - tip[2], 0.0), min(seg[m, n, s, 1] - tip[2], edge)
-                # what the range holds already needs no look at the outline
-                if stop <= start or (start >= low and stop <= high):
-                    continue
-                for p in range(outline.shape[1] - 1):
-                    z0, z1, r0, r1 = outline[0, p], outline[0, p + 1], outline[1, p], outline[1, p + 1]
-                    # where this piece of the outline is wider than the line is away
-                    if r0 <= away and r1 <= away:
-                        continue
-                    if r0 < away:
-                        z0 += (z1 - z0) * (away - r0) / (r1 - r0)
-                    elif r1 < away:
-                        z1 -= (z1 - z0) * (away - r1) / (r0 - r1)
-                    if min(z1, stop) > max(z0, start):
-                        low, high = min(low, max(z0, start)), max(high, min(z1, stop))
-    return low, high
-
-
-@numba.njit(cache=True)
 def _wall(segs, counts, lattice, plane, x, y, cut_from, found):
     """Collect the two ends of lines in a plane that are nearest to a point and not on the circle cut last; return how many there are.
 
@@ -258,9 +219,21 @@ def slice_arcs(segs, counts, lattice, plane, circle, cut_from, feed, slope, arcs
     level = math.sqrt(feed[0] ** 2 + feed[1] ** 2)
     frame = level_frame(feed)
     radius = circle[2]
-    most = 2 * int(2.0 * radius / cell[0] + 2.0 * radius / cell[1] + 4.0)
+    most = 2 * int(2.0 * radius / cell[0] + 2.0 * radius / cell[1] + 6.0)
     angle, inside = np.empty(most), np.empty(most, dtype=np.bool_)
     held = 0
+    steep = slope * feed[2]
+    graze = np.full(2, np.nan)
+    if level > abs(steep):
+        graze[0] = math.asin(steep / level)
+        graze[1] = math.pi - graze[0]
+        # the side that turns away is not looked at: a point on either side of it stands for all
+        angle[0] = graze[0] - 1e-3
+        angle[1] = graze[1] + 1e-3 - (2.0 * math.pi if graze[1] + 1e-3 > math.pi else 0.0)
+        inside[0] = inside[1] = False
+        held = 2
+    elif steep > 0.0:
+        return 0
     for along in range(2):
         other = 1 - along
         first, last = (
@@ -275,19 +248,15 @@ def slice_arcs(segs, counts, lattice, plane, circle, cut_from, feed, slope, arcs
             half = math.sqrt(half)
             for side in (-half, half):
                 x, y = (side, across) if along == 0 else (across, side)
+                if (x * frame[0, 0] + y * frame[0, 1]) / radius * level <= steep:
+                    continue
                 angle[held] = math.atan2(x * frame[0, 0] + y * frame[0, 1], x * frame[1, 0] + y * frame[1, 1])
                 inside[held] = _holds(segs[along], counts[along], plane, n, circle[along] + side)
                 held += 1
-    if held == 0 or not np.any(inside[:held]):
+    if not np.any(inside[:held]):
         return 0
     order = np.argsort(angle[:held])
-    angle, inside = angle[order], inside[order]
-    steep = slope * feed[2]
-    facing = np.sin(angle) * level > steep
-    graze = np.full(2, np.nan)
-    if level > abs(steep):
-        graze[0] = math.asin(steep / level)
-        graze[1] = math.pi - graze[0]
+    angle, inside, facing = angle[order], inside[order], (order > 1) | (graze[0] != graze[0])
     border = np.empty((arcs.shape[0], 4), dtype=np.int64)
     found = arcs_of(angle, inside, facing, graze, arcs, border)
     kept = 0
@@ -450,8 +419,8 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, rows, exten
     ----------
     segs, counts : tuples of three arrays
     lattice : array (2, 3)
-    tips : array (3, 3)
-        Where the tool has cut, a step ahead, and a cell ahead, where the material's top and bottom are looked up.
+    tips : array (2, 3)
+        Where the tool has cut, and a step ahead.
     outline : array (2, p)
     edge : float
         Height to which its edges reach.
@@ -460,14 +429,12 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, rows, exten
     rows : array (m, 3)
         Takes height above the tip, and where an arc begins and ends.
     extent : array (2,)
-        Takes between which heights there is material. A layer that no plane of the lattice goes through has none of the rows, and -1 is
-        returned.
+        Between which heights above the tip there is material around the tool; takes those of what is engaged. Where no plane of the
+        lattice lies between them, they stay, and -1 is returned.
     """
-    low, high = material_ahead(segs[2], counts[2], lattice, tips[2], outline, edge)
-    extent[0], extent[1] = low, high
-    if not high > low:
-        return 0
-    arcs, held, planes = np.empty((16, 2)), 0, 0
+    low, high = extent
+    arcs, last_arcs, held, planes = np.empty((16, 2)), np.empty((16, 2)), 0, 0
+    top, last_found, last_radius = 0.0, 0, 0.0
     circle, cut_from = np.empty(3), np.empty(3)
     frame = level_frame(feed)
     tip, cell = tips[1, 2], lattice[1, 2]
@@ -492,6 +459,10 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, rows, exten
         if z - tip < extent[0]:
             end = _end_beside(segs[2], counts[2], lattice, z, circle, frame, arcs, found, 0)
             extent[0] = (end if end > z - cell else z - 0.5 * cell) - tip if max(z - cell, end) > tip else 0.0
-        end = _end_beside(segs[2], counts[2], lattice, z, circle, frame, arcs, found, 1)
-        extent[1] = min((end if end < z + cell else z + 0.5 * cell) - tip, edge)
+        top, last_found, last_radius = z, found, radius
+        last_arcs[:found] = arcs[:found]
+    if held:
+        circle[2] = last_radius
+        end = _end_beside(segs[2], counts[2], lattice, top, circle, frame, last_arcs, last_found, 1)
+        extent[1] = min((end if end < top + cell else top + 0.5 * cell) - tip, edge)
     return held if planes else -1

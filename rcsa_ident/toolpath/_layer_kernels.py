@@ -1,4 +1,4 @@
-"""Where a tool stands in a layer that is thinner than the distance between lines; arrays and scalars only."""
+"""Between which heights a tool has material around it, and where it stands in a thin layer; arrays and scalars only."""
 
 from __future__ import annotations
 
@@ -6,6 +6,45 @@ import math
 
 import numba
 import numpy as np
+
+
+@numba.njit(cache=True)
+def material_ahead(seg, count, lattice, tip, outline, edge):
+    """Return between which heights above its tip an upright tool has material within a cell of its edges.
+
+    Thin chips stand between the lines: what is beside them tells of them. Where there is none, the first height is above the second.
+    """
+    origin, cell = lattice[0], lattice[1]
+    beside = max(cell[0], cell[1])
+    radius = np.max(outline[1]) + beside
+    low, high = np.inf, -np.inf
+    first = max(math.ceil((tip[0] - radius - origin[0]) / cell[0]), 0)
+    last = min(math.floor((tip[0] + radius - origin[0]) / cell[0]), seg.shape[0] - 1)
+    begin = max(math.ceil((tip[1] - radius - origin[1]) / cell[1]), 0)
+    end = min(math.floor((tip[1] + radius - origin[1]) / cell[1]), seg.shape[1] - 1)
+    for m in range(first, last + 1):
+        for n in range(begin, end + 1):
+            away = math.sqrt((origin[0] + m * cell[0] - tip[0]) ** 2 + (origin[1] + n * cell[1] - tip[1]) ** 2)
+            if away >= radius:
+                continue
+            away = max(away - beside, 0.0)
+            for s in range(count[m, n]):
+                start, stop = max(seg[m, n, s, 0] - tip[2], 0.0), min(seg[m, n, s, 1] - tip[2], edge)
+                # what the range holds already needs no look at the outline
+                if stop <= start or (start >= low and stop <= high):
+                    continue
+                for p in range(outline.shape[1] - 1):
+                    z0, z1, r0, r1 = outline[0, p], outline[0, p + 1], outline[1, p], outline[1, p + 1]
+                    # where this piece of the outline is wider than the line is away
+                    if r0 <= away and r1 <= away:
+                        continue
+                    if r0 < away:
+                        z0 += (z1 - z0) * (away - r0) / (r1 - r0)
+                    elif r1 < away:
+                        z1 -= (z1 - z0) * (away - r1) / (r0 - r1)
+                    if min(z1, stop) > max(z0, start):
+                        low, high = min(low, max(z0, start)), max(high, min(z1, stop))
+    return low, high
 
 
 @numba.njit(cache=True)

@@ -12,7 +12,7 @@ from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.errors import InputError
 from rcsa_ident.shown import Shown
 from rcsa_ident.toolpath._engagement_kernels import distance_at, engage_upright, leaning_arcs
-from rcsa_ident.toolpath._layer_kernels import layer_arcs
+from rcsa_ident.toolpath._layer_kernels import layer_arcs, material_ahead
 from rcsa_ident.toolpath.removal import Sweep, frame_of
 from rcsa_ident.toolpath.solid import ToolSolid
 
@@ -143,7 +143,7 @@ def engagement_along(
     >>> np.degrees([found.start, found.end]).round(2)[:, 0].tolist(), (1e3 * found.z[[0, -1]]).round(6).tolist()
     ([90.0, 180.0], [0.0, 2.0])
     """
-    path, field = sweep.path, sweep.field
+    path, field, axes = sweep.path, sweep.field, sweep.path.axes
     moves = len(path) - 1
     before = field.volume
     upright, ways, lengths = sweep.upright, path.moves, path.lengths
@@ -153,9 +153,8 @@ def engagement_along(
     for move in range(moves):
         if lengths[move] > _NOWHERE:
             feed = ways[move] / lengths[move]
-            axis = path.axes[move]
-            rise[move] = np.arcsin(np.clip(feed @ axis, -1.0, 1.0))
-            held = _upright(sweep, move, feed, rows, ends) if upright[move] else _leaning(sweep, move, feed, rows, ends)
+            rise[move] = np.arcsin(np.clip(feed @ axes[move], -1.0, 1.0))
+            held = _upright(sweep, move, feed, lengths[move], rows, ends) if upright[move] else _leaning(sweep, move, feed, rows, ends)
             extent[move] = ends
             if held:
                 found.append((move, _within_a_turn(rows[:held])))
@@ -172,14 +171,18 @@ def engagement_along(
     return PathEngagement(which, all_rows[:, 0], all_rows[:, 1], all_rows[:, 2], extent, rise, volume)
 
 
-def _upright(sweep: Sweep, move: int, feed: FloatArray, rows: FloatArray, extent: FloatArray) -> int:
+def _upright(sweep: Sweep, move: int, feed: FloatArray, length: float, rows: FloatArray, extent: FloatArray) -> int:
     field, solid = sweep.field, sweep.solid
-    here, cell = sweep.path.places[move], float(field.cell.min())
-    step = min(0.25 * cell, float(sweep.path.lengths[move]))
-    ahead = here + step * feed
-    probe = ahead + max(cell - step, 0.0) * np.array([feed[0], feed[1], 0.0])
-    tips = np.stack([here, ahead, probe])
-    held = engage_upright(field.segs, field.counts, field.lattice, tips, solid.outline, solid.edge, feed, rows, extent)
+    here, cell = sweep.path.places[move], float(sweep.lattice[1].min())
+    step = min(0.25 * cell, length)
+    tips = np.stack([here, here + step * feed])
+    # the material's top and bottom, a cell ahead
+    probe = tips[1].copy()
+    probe[:2] += max(cell - step, 0.0) * feed[:2]
+    extent[:] = material_ahead(field.segs[2], field.counts[2], sweep.lattice, probe, sweep.rough, solid.edge)
+    if not extent[1] > extent[0]:
+        return 0
+    held = engage_upright(field.segs, field.counts, sweep.lattice, tips, sweep.outline, solid.edge, feed, rows, extent)
     if held < 0:
         # a layer between two planes has one slice in its middle
         middle, level, arcs = 0.5 * (extent[0] + extent[1]), np.linalg.norm(feed[:2]), np.empty((16, 2))
@@ -187,7 +190,7 @@ def _upright(sweep: Sweep, move: int, feed: FloatArray, rows: FloatArray, extent
         held = 0
         if radius > 0.0 and level > 1e-9:
             centre = here + middle * sweep.path.axes[move]
-            held = layer_arcs(field.segs[2], field.counts[2], field.lattice, centre, radius, feed[:2] / level, arcs)
+            held = layer_arcs(field.segs[2], field.counts[2], sweep.lattice, centre, radius, feed[:2] / level, arcs)
         rows[:held, 0], rows[:held, 1:] = middle, arcs[:held]
     return int(held)
 
@@ -215,7 +218,7 @@ def _end_along(sweep: Sweep, tip: FloatArray, frame: FloatArray, row: FloatArray
     heights = np.clip([row[0], row[0] + way], 0.0, solid.edge)
     outwards = np.sin(middle) * frame[:, 0] + np.cos(middle) * frame[:, 1]
     points = tip + heights[:, None] * frame[:, 2] + solid.radius_at(heights)[:, None] * outwards
-    here, there = (distance_at(field.segs, field.counts, field.lattice, *point) for point in points)
+    here, there = (distance_at(field.segs, field.counts, sweep.lattice, *point) for point in points)
     if there >= 0.0 or here <= 0.0:
         return float(heights[1] if there > 0.0 else 0.5 * heights.sum())
     return float(heights[0] + (heights[1] - heights[0]) * here / (here - there))
@@ -229,7 +232,7 @@ def _slices(sweep: Sweep, tip: FloatArray, frame: FloatArray, feed: FloatArray, 
         if radius <= 0.0:
             continue
         centre = tip + height * frame[:, 2]
-        count = leaning_arcs(field.segs, field.counts, field.lattice, centre, frame, float(radius), way, float(slope), arcs)
+        count = leaning_arcs(field.segs, field.counts, sweep.lattice, centre, frame, float(radius), way, float(slope), arcs)
         count = min(count, len(rows) - held)
         rows[held : held + count, 0], rows[held : held + count, 1:] = height, arcs[:count]
         held += count

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import numpy as np
 
@@ -58,20 +59,26 @@ class Sweep(Shown):
     path: ToolPath
     tolerance: float = None  # type: ignore[assignment]
     #: Lengths taken along x, y, z [m] and lines met, of each move.
-    told: FloatArray = None  # type: ignore[assignment]
+    told: FloatArray = dataclass_field(init=False)
+    #: Which moves are made by an upright tool in one piece, shape (k - 1,).
+    upright: np.ndarray = dataclass_field(init=False)
+    #: Of field and tool, as kernels take them.
+    lattice: FloatArray = dataclass_field(init=False)
+    outline: FloatArray = dataclass_field(init=False)
+    #: The outline with as few points as the tolerance asks for.
+    rough: FloatArray = dataclass_field(init=False)
+    _peak: int = dataclass_field(init=False)
 
     def __post_init__(self) -> None:
         default = TOLERANCE * float(self.field.cell.max())
         self.tolerance = default if self.tolerance is None else positive("tolerance", self.tolerance, "m")
         self.told = np.zeros((max(len(self.path) - 1, 0), 4))
-
-    @property
-    def upright(self) -> np.ndarray:
-        """Which moves are made by an upright tool in one piece, shape (k - 1,)."""
+        self.lattice, self.outline, self._peak = self.field.lattice, self.solid.outline, self.solid.peak
+        self.rough = self.solid.coarser(0.1 * self.tolerance).outline
         stands = (np.hypot(self.path.axes[:, 0], self.path.axes[:, 1]) < _UPRIGHT) & (self.path.axes[:, 2] > 0.0)
         ways = self.path.moves
         ramp = (ways[:, 2] != 0.0) & np.any(ways[:, :2] != 0.0, axis=1)
-        return stands[1:] & stands[:-1] & (self.solid.convex | (self.solid.rises_to_one_peak & ~ramp))
+        self.upright = stands[1:] & stands[:-1] & (self.solid.convex | (self.solid.rises_to_one_peak & ~ramp))
 
     @property
     def updates(self) -> int:
@@ -91,8 +98,7 @@ class Sweep(Shown):
 
     def run(self, start: int = 0, stop: int | None = None, been: bool = False) -> None:
         """Make the moves from `start` to before `stop`; `been` says that the tool has cut where the first one begins."""
-        stop = len(self.path) - 1 if stop is None else stop
-        upright = self.upright
+        stop, upright = len(self.path) - 1 if stop is None else stop, self.upright
         while start < stop:
             behind = start + 1
             while behind < stop and upright[behind] == upright[start]:
@@ -110,17 +116,14 @@ class Sweep(Shown):
         for angle in np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False):
             point = tip + frame @ np.array([radius * np.cos(angle), radius * np.sin(angle), height])
             # the distance says how deep it stands, half a cell of doubt aside
-            if distance_at(field.segs, field.counts, field.lattice, *point) > 0.5 * float(field.cell.max()):
+            if distance_at(field.segs, field.counts, self.lattice, *point) > 0.5 * float(field.cell.max()):
                 return True
         return False
 
     def _run_upright(self, start: int, stop: int, been: bool) -> None:
-        field, outline = self.field, self.solid.outline
-        moves = np.array([start, stop])
+        field, moves = self.field, np.array([start, stop])
         while moves[0] < stop:
-            done = sweep_upright(
-                field.segs, field.counts, field.lattice, self.path.places, moves, outline, self.solid.peak, been, self.told
-            )
+            done = sweep_upright(field.segs, field.counts, self.lattice, self.path.places, moves, self.outline, self._peak, been, self.told)
             if done < stop:
                 # what is cut already stays so, and gives nothing a second time
                 field.make_room()
@@ -130,8 +133,7 @@ class Sweep(Shown):
                 break
 
     def _run_leaning(self, move: int) -> None:
-        solid = self.solid.coarser(0.1 * self.tolerance)
-        outline, lattice = solid.outline, self.field.lattice
+        outline, lattice = self.rough, self.lattice
         for tip, frame in poses_between(self.path, move, self.solid, self.tolerance):
             for grid, axes in enumerate(_AXES):
                 while not cut_leaning(self.field.segs[grid], self.field.counts[grid], axes, lattice, frame, tip, outline, self.told[move]):
