@@ -1,0 +1,140 @@
+"""path: what a tool does along a path through stock."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.lobes import ToolingFile, check_plot
+from rcsa_ident.errors import InputError
+
+if TYPE_CHECKING:
+    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.toolpath.path import ToolPath
+
+PathFile = Annotated[Path, typer.Argument(help="PATH of the tool's tip: x_mm, y_mm, z_mm, and i, j, k of its axis.", show_default=False)]
+
+path_app = typer.Typer(help="A tool along a path: the material that it takes out, where its edges cut.", no_args_is_help=True)
+
+
+@answers
+def remove(
+    tooling: ToolingFile,
+    path: PathFile,
+    stock: Annotated[
+        str,
+        typer.Option(
+            metavar="STOCK.stl|'X0 Y0 Z0 X1 Y1 Z1'",
+            help="What is cut: a closed surface, .stl, .obj or .ply in mm, or a block by two corners, mm.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="ENGAGEMENT.csv to write: the arcs at every place and slice.", show_default=False)],
+    cell_mm: Annotated[
+        float | None, typer.Option(help="Between lines of material; default: a twentieth of the tool's radius.", show_default=False)
+    ] = None,
+    step_mm: Annotated[
+        float | None, typer.Option(help="Between places on the path; default: a tenth of the tool's radius.", show_default=False)
+    ] = None,
+    part: Annotated[Path | None, typer.Option(help="PART.stl, .obj or .ply to write: what is left, in mm.", show_default=False)] = None,
+    plot: Annotated[Path | None, typer.Option(help="PART.png or .svg to draw: what is left, and the path.", show_default=False)] = None,
+    json_: Json = False,
+) -> None:
+    """Take out of the stock what the tool sweeps along the path, and tell where its edges are in the material."""
+    from rcsa_ident.io.engagements import write_engagement
+    from rcsa_ident.io.meshes import check_mesh_name, read_mesh, write_mesh
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.path_removal import remove_along
+
+    writable(out)
+    check_plot(plot)
+    if part is not None:
+        check_mesh_name(part)
+        writable(part, "--part")
+    tool, way = read_tooling(tooling), _tool_path(path)
+    block = surface = None
+    if Path(stock).suffix and not _numbers(stock):
+        surface = read_mesh(stock)
+    else:
+        block = _block(stock)
+    cell, step = _metres("--cell-mm", cell_mm), _metres("--step-mm", step_mm)
+    stages = Stages(quiet=json_)
+    with stages.stage("removal") as line:
+        found = remove_along(tool, way, block, surface, cell, step, line)
+    write_engagement(out, found.path, found.engagement, found.arc_volume)
+    if part is not None:
+        with stages.stage("surface"):
+            points, faces = found.part.mesh()
+            if not len(faces):
+                raise InputError("--part", "nothing that is left", "a path that leaves a part of the stock")
+            write_mesh(part, points, faces)
+    if plot is not None:
+        from rcsa_ident.report.part import save_part
+
+        with stages.stage("picture"):
+            save_part(plot, found.part, found.path)
+    if json_:
+        emit(
+            {
+                "removed_volume_mm3": 1e9 * found.removed,
+                "positions": len(found.path),
+                "seconds": found.seconds,
+                "dexel_updates": found.updates,
+                "cell_mm": 1e3 * float(found.part.cell.max()),
+                "memory_bytes": found.part.memory,
+                "warnings": list(found.warnings),
+                "out": str(out),
+            }
+        )
+        return
+    say(f"{1e9 * found.removed:.6g} mm³ are taken out of {1e9 * (found.removed + found.part.volume):.6g} mm³ on {len(found.path)} places")
+    rate = 1e-6 * found.updates / max(found.seconds, 1e-9)
+    say(f"lines every {1e3 * float(found.part.cell.max()):.3g} mm, {found.part.memory / 1e6:.3g} MB, {rate:.3g} million updates a second")
+    for warning in found.warnings:
+        warn(warning)
+    for written in (out, part, plot):
+        if written is not None:
+            say(f"written: {written}" + (f" ({found.seconds:.2f} s)" if written == out else ""))
+
+
+def _tool_path(path: Path) -> ToolPath:
+    from rcsa_ident.io.paths import read_path
+    from rcsa_ident.toolpath.path import ToolPath
+
+    return ToolPath(*read_path(path))
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        return []
+
+
+def _block(text: str) -> tuple[FloatArray, FloatArray]:
+    """The two corners of a block, in metres."""
+    import numpy as np
+
+    found = _numbers(text)
+    if len(found) != 6 or not all(math.isfinite(each) for each in found):
+        raise InputError("--stock", text, "a file that ends in .stl, .obj or .ply, or six numbers 'X0 Y0 Z0 X1 Y1 Z1' [mm]")
+    low, high = np.array(found[:3]) * 1e-3, np.array(found[3:]) * 1e-3
+    if not np.all(high > low):
+        raise InputError("--stock", text, "the lower corner of the block first: X0 < X1, Y0 < Y1, Z0 < Z1 [mm]")
+    return low, high
+
+
+def _metres(option: str, value: float | None) -> float | None:
+    if value is None:
+        return None
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError(option, value, "a length above 0 [mm]")
+    return 1e-3 * value
+
+
+#: By its name on the command line.
+COMMANDS: dict[str, Any] = {"remove": remove}

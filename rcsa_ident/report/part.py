@@ -1,0 +1,135 @@
+"""A picture of a part that was cut: shaded at an angle with its sizes, and its heights from above with the path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.report.figures import _STYLE
+from rcsa_ident.toolpath.dexel import DexelField
+from rcsa_ident.toolpath.path import ToolPath
+
+#: Where one stands who looks at the part: azimuth from x, and elevation [rad].
+_AZIMUTH, _ELEVATION = np.radians(-60.0), np.radians(35.0)
+#: Pixels along the longer side of the shaded view.
+_PIXELS = 900
+_STEEL, _INK, _PATH = np.array([0.70, 0.76, 0.82]), "#1f2933", "#C8501A"
+#: Places that a path is drawn with, at most.
+_DRAWN = 5000
+
+
+def part_figure(field: DexelField, path: ToolPath | None = None) -> Figure:
+    """Return the picture of what is left of a stock, axes in mm.
+
+    Parameters
+    ----------
+    field : DexelField
+    path : ToolPath or None
+        Drawn from above: cutting moves as lines, rapid ones dashed.
+    """
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
+        _shaded(left, field)
+        _from_above(right, field, path)
+    return figure
+
+
+def save_part(path: str | Path, field: DexelField, tool_path: ToolPath | None = None) -> None:
+    """Write the picture as the file's suffix says."""
+    with mpl.rc_context(_STYLE):
+        part_figure(field, tool_path).savefig(path, dpi=150)
+
+
+def _shaded(axes: Axes, field: DexelField) -> None:
+    """All triangles from an angle, the nearest one of each pixel, in the light from above left."""
+    axes.set_title("what is left")
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
+    towards = np.array([np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
+    up = np.cross(towards, right)
+    view = np.stack([right, up, towards])
+    corners = np.array([[(field.low, field.high)[(k >> a) & 1][a] for a in range(3)] for k in range(8)]) * 1e3
+    flat = corners @ view[:2].T
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    points, faces = field.mesh()
+    if len(faces):
+        size = float(np.max(high - low)) / _PIXELS
+        image = _rendered(1e3 * points, faces, view, low, high, size)
+        axes.imshow(image, origin="lower", extent=(low[0], low[0] + size * image.shape[1], low[1], low[1] + size * image.shape[0]))
+    ends = ((0, 1, "x"), (1, 3, "y"), (3, 7, "z"))
+    for one, two, name in ends:
+        a, b = flat[one], flat[two]
+        axes.plot(*np.stack([a, b], axis=1), color=_INK, linewidth=0.8)
+        length = float(np.linalg.norm(corners[two] - corners[one]))
+        out = 0.5 * (a + b) - flat.mean(axis=0)
+        place = 0.5 * (a + b) + 0.05 * float(np.max(high - low)) * out / np.linalg.norm(out)
+        axes.text(
+            float(place[0]),
+            float(place[1]),
+            f"{name} {length:.4g} mm",
+            ha="left" if out[0] > 0.0 else "right",
+            va="center",
+            color=_INK,
+            fontsize=9.0,
+        )
+    margin = 0.16 * (high - low)
+    axes.set_xlim(low[0] - margin[0], high[0] + margin[0])
+    axes.set_ylim(low[1] - margin[1], high[1] + margin[1])
+
+
+def _rendered(points: FloatArray, faces: np.ndarray, view: FloatArray, low: FloatArray, high: FloatArray, size: float) -> FloatArray:
+    """Image, shape (rows, columns, 4): points spread over each triangle, drawn from the farthest to the nearest."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(area, 1e-300)[:, None]
+    facing = normal @ view[2] > 0.0
+    a, b, c, normal, area = (each[facing] for each in (a, b, c, normal, area))
+    light = np.array([-0.35, -0.25, 0.9])
+    shade = 0.30 + 0.70 * np.clip(normal @ (light / np.linalg.norm(light)), 0.0, 1.0)
+    shape = np.ceil((high - low) / size).astype(int)[::-1] + 1
+    depth, value = np.full(shape, -np.inf), np.zeros(shape)
+    # as many points on each side of a triangle that no pixel inside it is left out
+    longest = np.sqrt(np.max([np.sum((q - p) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0))
+    for pieces in np.unique(np.ceil(1.5 * longest / size)).astype(int):
+        own = np.ceil(1.5 * longest / size) == pieces
+        for i in range(pieces + 1):
+            for j in range(pieces + 1 - i):
+                u, v = i / max(pieces, 1), j / max(pieces, 1)
+                spot = (1.0 - u - v) * a[own] + u * b[own] + v * c[own]
+                column, row = (((spot @ view[k]) - low[k]) / size for k in range(2))
+                rows, columns = np.clip(row.astype(int), 0, shape[0] - 1), np.clip(column.astype(int), 0, shape[1] - 1)
+                near = spot @ view[2]
+                order = np.argsort(near)
+                rows, columns, near, lit = rows[order], columns[order], near[order], shade[own][order]
+                nearer = near > depth[rows, columns]
+                depth[rows[nearer], columns[nearer]] = near[nearer]
+                value[rows[nearer], columns[nearer]] = lit[nearer]
+    image = np.zeros((*shape, 4))
+    image[..., :3], image[..., 3] = np.clip(value[..., None] * _STEEL * 1.25, 0.0, 1.0), np.isfinite(depth)
+    return image
+
+
+def _from_above(axes: Axes, field: DexelField, path: ToolPath | None) -> None:
+    heights = 1e3 * field.height_map().T
+    extent = (1e3 * field.low[0], 1e3 * field.high[0], 1e3 * field.low[1], 1e3 * field.high[1])
+    shown = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis", interpolation="nearest")
+    axes.figure.colorbar(shown, ax=axes, label="height z, mm", shrink=0.85)
+    axes.set_title("from above")
+    axes.set_xlabel("x, mm")
+    axes.set_ylabel("y, mm")
+    axes.grid(False)
+    if path is not None and len(path) > 1:
+        every = max(1, len(path) // _DRAWN)
+        x, y = 1e3 * path.places[::every, 0], 1e3 * path.places[::every, 1]
+        axes.plot(x, y, color=_PATH, linewidth=0.9, alpha=0.8)
+    width, height = extent[1] - extent[0], extent[3] - extent[2]
+    axes.set_xlim(extent[0] - 0.15 * width, extent[1] + 0.15 * width)
+    axes.set_ylim(extent[2] - 0.15 * height, extent[3] + 0.15 * height)

@@ -1,0 +1,68 @@
+"""Triangles into lines and lines into triangles; this test runs again without the compiler."""
+
+import numpy as np
+import pytest
+
+from rcsa_ident.toolpath.dexel import DexelField, check_closed
+
+
+def box(low, high):
+    """The twelve triangles of a block."""
+    low, high = np.asarray(low), np.asarray(high)
+    points = np.array([[(low, high)[(k >> a) & 1][a] for a in range(3)] for k in range(8)])
+    sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return points, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
+
+
+def test_a_block_of_triangles_is_a_block():
+    points, faces = box([0.001, 0.002, 0.0], [0.011, 0.009, 0.003])
+    found, wanted = DexelField.from_mesh(points, faces, 0.8e-3), DexelField.block(points[0], points[7], 0.8e-3)
+    assert found.shape == wanted.shape
+    for ours, theirs in zip((*found.segs, *found.counts), (*wanted.segs, *wanted.counts), strict=True):
+        assert ours == pytest.approx(theirs, abs=1e-15)
+
+
+def test_lines_through_corners_and_edges_go_in_and_out():
+    """A tetrahedron whose edges and corners lie on the lattice's own lines."""
+    points = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]) * 1e-3
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    # cells of 4/5 mm: the middle node is on many of the slope's edges
+    field = DexelField.from_mesh(points, faces, 0.8e-3)
+    # five cells: what is left is of the second order
+    assert field.volume == pytest.approx(4e-3**3 / 6.0 * (1.0 - 0.2**2), rel=1e-9)
+    assert all(np.all(count <= 1) for count in field.counts)
+    below, above = field.segs[2][1, 1, 0]
+    assert (below, above) == pytest.approx((0.0, 4e-3 - 2 * 1.2e-3), abs=1e-12)
+
+
+def test_bodies_that_overlap_are_one():
+    one, two = box([0.0, 0.0, 0.0], [0.004, 0.004, 0.004]), box([0.002, 0.0, 0.0], [0.006, 0.004, 0.004])
+    both = np.concatenate([one[0], two[0]]), np.concatenate([one[1], two[1] + 8])
+    assert DexelField.from_mesh(*both, 0.5e-3).volume == pytest.approx(96e-9, rel=1e-9)
+
+
+def test_a_surface_net_is_closed_and_faces_outwards():
+    field = DexelField.block([0.0, 0.0, 0.0], [0.006, 0.005, 0.004], 0.9e-3)
+    # a hole right through, two corners that touch, and a cave
+    for m, n, low, high in ((2, 2, -1.0, 1.0), (3, 3, 0.002, 1.0), (5, 1, 0.001, 0.003)):
+        seg, count = field.segs[2], field.counts[2]
+        if low < 0.0:
+            count[m, n] = 0
+        elif high > 0.5:
+            seg[m, n, 0, 1] = low
+        else:
+            seg[m, n, 0, 1], seg[m, n, 1], count[m, n] = low, (high, 0.004), 2
+    points, faces = field.mesh()
+    check_closed(points, faces)
+    corners = points[faces]
+    enclosed = np.sum(np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]) / 6.0
+    assert enclosed == pytest.approx(field.volume, rel=0.15)
+    assert np.all(points.min(axis=0) >= field.low - 1e-15)
+
+
+def test_a_block_comes_back_but_for_its_edges():
+    field = DexelField.block([0.0, 0.0, 0.0], [0.006, 0.005, 0.004], 0.5e-3)
+    points, faces = field.mesh()
+    back = DexelField.from_mesh(points, faces, 0.5e-3)
+    assert 0.95 * field.volume < back.volume < field.volume
+    assert np.allclose([back.low, back.high], [field.low, field.high], rtol=0.0, atol=1e-15)
