@@ -14,9 +14,23 @@ from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
-    from rcsa_ident.toolpath.path import ToolPath
 
-PathFile = Annotated[Path, typer.Argument(help="PATH of the tool's tip: x_mm, y_mm, z_mm, and i, j, k of its axis.", show_default=False)]
+PathFile = Annotated[Path, typer.Argument(help="PATH.nc (G-code) or PATH.csv of the tool's tip.", show_default=False)]
+
+Stock = Annotated[
+    str,
+    typer.Option(
+        metavar="STOCK.stl|'X0 Y0 Z0 X1 Y1 Z1'",
+        help="What is cut: a closed surface, .stl, .obj or .ply in mm, or a block by two corners, mm.",
+        show_default=False,
+    ),
+]
+CellMm = Annotated[
+    float | None, typer.Option(help="Between lines of material; default: a twentieth of the tool's radius.", show_default=False)
+]
+StepMm = Annotated[
+    float | None, typer.Option(help="Between places on the path; default: a tenth of the tool's radius.", show_default=False)
+]
 
 path_app = typer.Typer(help="A tool along a path: the material that it takes out, where its edges cut.", no_args_is_help=True)
 
@@ -25,46 +39,32 @@ path_app = typer.Typer(help="A tool along a path: the material that it takes out
 def remove(
     tooling: ToolingFile,
     path: PathFile,
-    stock: Annotated[
-        str,
-        typer.Option(
-            metavar="STOCK.stl|'X0 Y0 Z0 X1 Y1 Z1'",
-            help="What is cut: a closed surface, .stl, .obj or .ply in mm, or a block by two corners, mm.",
-            show_default=False,
-        ),
-    ],
+    stock: Stock,
     out: Annotated[Path, typer.Option(help="ENGAGEMENT.csv to write: the arcs at every place and slice.", show_default=False)],
-    cell_mm: Annotated[
-        float | None, typer.Option(help="Between lines of material; default: a twentieth of the tool's radius.", show_default=False)
-    ] = None,
-    step_mm: Annotated[
-        float | None, typer.Option(help="Between places on the path; default: a tenth of the tool's radius.", show_default=False)
-    ] = None,
+    cell_mm: CellMm = None,
+    step_mm: StepMm = None,
     part: Annotated[Path | None, typer.Option(help="PART.stl, .obj or .ply to write: what is left, in mm.", show_default=False)] = None,
     plot: Annotated[Path | None, typer.Option(help="PART.png or .svg to draw: what is left, and the path.", show_default=False)] = None,
     json_: Json = False,
 ) -> None:
     """Take out of the stock what the tool sweeps along the path, and tell where its edges are in the material."""
     from rcsa_ident.io.engagements import write_engagement
-    from rcsa_ident.io.meshes import check_mesh_name, read_mesh, write_mesh
+    from rcsa_ident.io.meshes import check_mesh_name, write_mesh
+    from rcsa_ident.io.paths import read_tool_path
     from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.path_removal import remove_along
+    from rcsa_ident.workflows.path_removal import field_of, remove_along
 
     writable(out)
     check_plot(plot)
     if part is not None:
         check_mesh_name(part)
         writable(part, "--part")
-    tool, way = read_tooling(tooling), _tool_path(path)
-    block = surface = None
-    if Path(stock).suffix and not _numbers(stock):
-        surface = read_mesh(stock)
-    else:
-        block = _block(stock)
-    cell, step = _metres("--cell-mm", cell_mm), _metres("--step-mm", step_mm)
+    tool, way = read_tooling(tooling), read_tool_path(path)
+    step = metres("--step-mm", step_mm)
+    field = field_of(tool, *stock_of(stock), metres("--cell-mm", cell_mm))
     stages = Stages(quiet=json_)
     with stages.stage("removal") as line:
-        found = remove_along(tool, way, block, surface, cell, step, line)
+        found = remove_along(tool, way, field, step, line)
     write_engagement(out, found.path, found.engagement, found.arc_volume)
     if part is not None:
         with stages.stage("surface"):
@@ -101,11 +101,13 @@ def remove(
             say(f"written: {written}" + (f" ({found.seconds:.2f} s)" if written == out else ""))
 
 
-def _tool_path(path: Path) -> ToolPath:
-    from rcsa_ident.io.paths import read_path
-    from rcsa_ident.toolpath.path import ToolPath
+def stock_of(text: str) -> tuple[tuple[FloatArray, FloatArray] | None, tuple[FloatArray, Any] | None]:
+    """Return a block by its corners [m] or a surface, whichever an option names."""
+    from rcsa_ident.io.meshes import read_mesh
 
-    return ToolPath(*read_path(path))
+    if Path(text).suffix and not _numbers(text):
+        return None, read_mesh(text)
+    return _block(text), None
 
 
 def _numbers(text: str) -> list[float]:
@@ -128,7 +130,8 @@ def _block(text: str) -> tuple[FloatArray, FloatArray]:
     return low, high
 
 
-def _metres(option: str, value: float | None) -> float | None:
+def metres(option: str, value: float | None) -> float | None:
+    """Return a length above 0 that an option has in millimetres, where it has one."""
     if value is None:
         return None
     if not (math.isfinite(value) and value > 0.0):

@@ -20,9 +20,9 @@ from rcsa_ident.units import from_rpm, to_hz, to_rpm
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import TipSource
     from rcsa_ident.machining_setup import CutSpec, Tooling
-    from rcsa_ident.toolpath.dexel import DexelField
     from rcsa_ident.toolpath.path import ToolPath
     from rcsa_ident.workflows.path_milling import PathMilling
+    from rcsa_ident.workflows.path_removal import PathRemoval
     from rcsa_ident.workflows.path_stability import CutsAlong
     from rcsa_ident.workflows.tool_change import ToolChange
 
@@ -73,7 +73,7 @@ def stability(
     import numpy as np
 
     from rcsa_ident.io.path_tables import place_columns, write_columns
-    from rcsa_ident.workflows.path_removal import remove_along
+    from rcsa_ident.workflows.path_removal import field_of, remove_along
     from rcsa_ident.workflows.path_stability import cuts_along, described, stations_along
 
     for written, option in ((out, "--out"), (plot, "--plot"), (plot_error, "--plot-error")):
@@ -81,9 +81,10 @@ def stability(
             writable(written, option)
     machine, tooling, path = _subjects(files, tip, posture)
     change = _change(machine, tooling, _cut(material, ktc_mpa, krc, kac), speed_rpm, method, bands)
+    field = field_of(tooling, *stock_of(stock), metres("--cell-mm", cell_mm))
     stages = Stages(quiet=json_)
     with stages.stage("removal") as line:
-        removal = remove_along(tooling, path, *stock_of(stock), metres("--cell-mm", cell_mm), metres("--step-mm", step_mm), line)
+        removal = remove_along(tooling, path, field, metres("--step-mm", step_mm), line)
     with stages.stage("stability") as line:
         found = cuts_along(change, removal.path, removal.engagement, stations_along(machine, tooling, removal.path), line)
     way, cutting = removal.path, np.flatnonzero(found.cutting)
@@ -106,16 +107,15 @@ def stability(
         "form_error_um": 1e6 * found.form_error[cutting],
     }
     write_columns(out, columns)
-    _plots(removal.part, way, found, plot, plot_error)
+    _plots(removal, tooling, found, plot, plot_error)
     warnings = [*removal.warnings, *tooling.remarks, *machine.remarks, *found.warnings]
     if json_:
         emit(_summary(found, way) | {"warnings": warnings, "seconds": stages.seconds, "out": str(out)})
         return
     say(described(found, way))
     if cutting.size:
-        say(
-            f"forces up to {np.nanmax(found.peak_force):.0f} N across the tool's axis; {found.groups} different cuts on {cutting.size} moves"
-        )
+        most = f"{np.nanmax(found.peak_force):.0f} N across the tool's axis"
+        say(f"forces up to {most}; {found.groups} different cuts on {cutting.size} moves")
     errors = found.form_error[np.isfinite(found.form_error)]
     if errors.size:
         say(f"walls are off by {1e6 * errors.min():.1f} to {1e6 * errors.max():.1f} µm; above 0 material is left")
@@ -273,18 +273,19 @@ def _surface_columns(found: PathMilling, path: ToolPath) -> dict[str, Any]:
     return columns | {"error_um": 1e6 * table[:, 4], "line": path.line[1:][table[:, 5].astype(int)]}
 
 
-def _plots(part: DexelField, path: ToolPath, found: CutsAlong, margin: Path | None, error: Path | None) -> None:
+def _plots(removal: PathRemoval, tooling: Tooling, found: CutsAlong, margin: Path | None, error: Path | None) -> None:
     """Draw the part coloured by what each move did to it."""
     if margin is None and error is None:
         return
     from rcsa_ident.report.part import save_coloured_part
+    from rcsa_ident.workflows.path_removal import solid_of
 
     for file, values, label, limits in (
         (margin, found.margin_low, "margin to chatter", (0.0, 2.0)),
         (error, 1e6 * found.form_error, "form error of the wall [µm]", None),
     ):
         if file is not None:
-            save_coloured_part(file, part, path, values, label, limits)
+            save_coloured_part(file, removal.part, removal.path, values, label, limits, solid_of(tooling).radius)
 
 
 #: By their names on the command line.

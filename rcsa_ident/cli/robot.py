@@ -99,7 +99,7 @@ def tip(
 ) -> None:
     """Predict the tooltip FRF of a tooling on an arm at a posture, along the tool's x, its y turned around, and into the spindle."""
     writable(out)
-    machine = replace(_posed(robot, posture, joints_only), highest=from_hz(to))
+    machine = replace(posed_robot(robot, posture, joints_only), highest=from_hz(to))
     tell_tooltip(machine, tooling, out, inclusive(from_, to, step, ("--from", "--to", "--step"), "Hz"), json_=json_)
 
 
@@ -121,7 +121,7 @@ def lobes(
 
     writable(out)
     check_plot(plot)
-    machine = _posed(robot, posture, joints_only)
+    machine = posed_robot(robot, posture, joints_only)
     change = change_of(machine, read_tooling(tooling), cut_of(cut, speeds.speed_variation), speeds, False, 0.0)
     tell_lobes(change, out, plot=plot, json_=json_)
 
@@ -159,7 +159,7 @@ def map_(
     from rcsa_ident.workflows.robot_postures import following, limits_along
 
     writable(out)
-    machine, tool = _posed(robot, posture, joints_only), read_tooling(tooling)
+    machine, tool = posed_robot(robot, posture, joints_only), read_tooling(tooling)
     along = read_tool_path(path)
     change = change_of(machine, tool, cut_of(cut, speeds.speed_variation), speeds, False, 0.0)
     stages = Stages(quiet=json_)
@@ -210,7 +210,17 @@ def _found(path: Path, joints_only: bool) -> RobotPosterior | None:
     return read_robot_result(path)
 
 
-def _posed(path: Path, posture: str, joints_only: bool) -> PosedRobot:
+def is_robot(path: Path) -> bool:
+    """Return whether a file describes an arm: ROBOT.toml, or RESULT.json of one."""
+    from rcsa_ident.io.results import read_json
+    from rcsa_ident.io.robot_results import KIND
+
+    kind = path.suffix.lower()
+    return kind == ".toml" or (kind == ".json" and read_json(path, "machine").get("kind") == KIND)
+
+
+def posed_robot(path: Path, posture: str, joints_only: bool) -> PosedRobot:
+    """Return an arm of a file at a posture that an option names."""
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
 
     found = _found(path, joints_only)

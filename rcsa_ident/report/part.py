@@ -13,6 +13,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath
+from rcsa_ident.toolpath.removal import made_by
 
 #: Where one stands who looks at the part: azimuth from x, and elevation [rad].
 _AZIMUTH, _ELEVATION = np.radians(-60.0), np.radians(35.0)
@@ -46,7 +47,60 @@ def save_part(path: str | Path, field: DexelField, tool_path: ToolPath | None = 
         part_figure(field, tool_path).savefig(path, dpi=150)
 
 
-def _shaded(axes: Axes, field: DexelField) -> None:
+def coloured_part_figure(
+    field: DexelField, path: ToolPath, values: FloatArray, label: str, limits: tuple[float, float] | None = None, reach: float = 0.0
+) -> Figure:
+    """Return a part whose surface has the colour of the move that made it, and the path from above in the same colours.
+
+    Parameters
+    ----------
+    field : DexelField
+        What is left.
+    path : ToolPath
+    values : array, shape (k - 1,)
+        Of the moves; a surface that none of them made, or one without a value, is grey.
+    label : str
+    limits : tuple of float, optional
+        Of the colours; by default those of the values.
+    reach : float [m]
+        The tool's radius.
+    """
+    known = values[np.isfinite(values)]
+    low, high = limits if limits is not None else (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    colours = mpl.cm.ScalarMappable(mpl.colors.Normalize(low, high if high > low else low + 1.0), "RdYlGn" if limits else "coolwarm")
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
+        points, faces = field.mesh()
+        made = (
+            made_by(points[faces].mean(axis=1), path, np.flatnonzero(np.isfinite(values)), reach, 1.5 * float(field.cell.max()))
+            if len(faces)
+            else np.zeros(0, dtype=int)
+        )
+        value = np.where(made >= 0, np.append(values, np.nan)[made], np.nan)
+        paint = np.where(np.isfinite(value)[:, None], colours.to_rgba(np.nan_to_num(value))[:, :3], _STEEL)
+        _shaded(left, field, (points, faces), paint)
+        for move in np.flatnonzero(path.cutting):
+            x, y = 1e3 * path.places[move : move + 2, :2].T
+            told = np.isfinite(values[move])
+            right.plot(x, y, color=colours.to_rgba(values[move]) if told else "0.8", linewidth=2.5 if told else 1.0, solid_capstyle="round")
+        figure.colorbar(colours, ax=right, label=label, shrink=0.85)
+        right.set_aspect("equal", adjustable="datalim")
+        right.set_title("the path from above")
+        right.set_xlabel("x, mm")
+        right.set_ylabel("y, mm")
+    return figure
+
+
+def save_coloured_part(
+    file: str | Path, field: DexelField, path: ToolPath, values: FloatArray, label: str, limits: tuple[float, float] | None, reach: float
+) -> None:
+    """Write `coloured_part_figure` as the file's suffix says."""
+    with mpl.rc_context(_STYLE):
+        coloured_part_figure(field, path, values, label, limits, reach).savefig(file, dpi=150)
+
+
+def _shaded(axes: Axes, field: DexelField, surface: tuple[FloatArray, np.ndarray] | None = None, paint: FloatArray | None = None) -> None:
     """All triangles from an angle, the nearest one of each pixel, in the light from above left."""
     axes.set_title("what is left")
     axes.set_axis_off()
@@ -58,10 +112,10 @@ def _shaded(axes: Axes, field: DexelField) -> None:
     corners = np.array([[(field.low, field.high)[(k >> a) & 1][a] for a in range(3)] for k in range(8)]) * 1e3
     flat = corners @ view[:2].T
     low, high = flat.min(axis=0), flat.max(axis=0)
-    points, faces = field.mesh()
+    points, faces = field.mesh() if surface is None else surface
     if len(faces):
         size = float(np.max(high - low)) / _PIXELS
-        image = _rendered(1e3 * points, faces, view, low, high, size)
+        image = _rendered(1e3 * points, faces, view, low, high, size, _STEEL if paint is None else paint)
         axes.imshow(image, origin="lower", extent=(low[0], low[0] + size * image.shape[1], low[1], low[1] + size * image.shape[0]))
     ends = ((0, 1, "x"), (1, 3, "y"), (3, 7, "z"))
     for one, two, name in ends:
@@ -84,18 +138,21 @@ def _shaded(axes: Axes, field: DexelField) -> None:
     axes.set_ylim(low[1] - margin[1], high[1] + margin[1])
 
 
-def _rendered(points: FloatArray, faces: np.ndarray, view: FloatArray, low: FloatArray, high: FloatArray, size: float) -> FloatArray:
+def _rendered(
+    points: FloatArray, faces: np.ndarray, view: FloatArray, low: FloatArray, high: FloatArray, size: float, paint: FloatArray
+) -> FloatArray:
     """Image, shape (rows, columns, 4): points spread over each triangle, drawn from the farthest to the nearest."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=1)
     normal /= np.maximum(area, 1e-300)[:, None]
     facing = normal @ view[2] > 0.0
-    a, b, c, normal, area = (each[facing] for each in (a, b, c, normal, area))
+    paint = np.broadcast_to(paint, (len(faces), 3))
+    a, b, c, normal, area, paint = (each[facing] for each in (a, b, c, normal, area, paint))
     light = np.array([-0.35, -0.25, 0.9])
     shade = 0.30 + 0.70 * np.clip(normal @ (light / np.linalg.norm(light)), 0.0, 1.0)
     shape = np.ceil((high - low) / size).astype(int)[::-1] + 1
-    depth, value = np.full(shape, -np.inf), np.zeros(shape)
+    depth, value = np.full(shape, -np.inf), np.zeros((*shape, 3))
     # as many points on each side of a triangle that no pixel inside it is left out
     longest = np.sqrt(np.max([np.sum((q - p) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0))
     for pieces in np.unique(np.ceil(1.5 * longest / size)).astype(int):
@@ -108,12 +165,12 @@ def _rendered(points: FloatArray, faces: np.ndarray, view: FloatArray, low: Floa
                 rows, columns = np.clip(row.astype(int), 0, shape[0] - 1), np.clip(column.astype(int), 0, shape[1] - 1)
                 near = spot @ view[2]
                 order = np.argsort(near)
-                rows, columns, near, lit = rows[order], columns[order], near[order], shade[own][order]
+                rows, columns, near, lit = rows[order], columns[order], near[order], (shade[:, None] * paint)[own][order]
                 nearer = near > depth[rows, columns]
                 depth[rows[nearer], columns[nearer]] = near[nearer]
                 value[rows[nearer], columns[nearer]] = lit[nearer]
     image = np.zeros((*shape, 4))
-    image[..., :3], image[..., 3] = np.clip(value[..., None] * _STEEL * 1.25, 0.0, 1.0), np.isfinite(depth)
+    image[..., :3], image[..., 3] = np.clip(1.25 * value, 0.0, 1.0), np.isfinite(depth)
     return image
 
 

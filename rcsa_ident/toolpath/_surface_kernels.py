@@ -247,3 +247,26 @@ def nodes_and_rest(seg, count, origin, cell, cell_one, cell_two):
                     two = min(_nearest_end(seg, count, m, n - 1, which, place), _nearest_end(seg, count, m, n + 1, which, place)) / cell_two
                     rest += beyond / (1.0 + one * one + two * two)
     return nodes, rest
+
+
+@numba.njit(cache=True, error_model="numpy")
+def last_move(points, places, moves, reach, below, out):
+    """Fill the last of some moves whose upright tool came as near to each point as `reach` beside its axis, and no higher than `below`.
+
+    points: (v, 3); places: (k, 3), move m from m to m + 1; moves: ascending; out: (v,) kept where there is none.
+    """
+    for p in range(points.shape[0]):
+        x, y, z = points[p]
+        for n in range(moves.size - 1, -1, -1):
+            m = moves[n]
+            ax, ay, az = places[m]
+            bx, by, bz = places[m + 1]
+            if z < min(az, bz) - below:
+                continue
+            dx, dy = bx - ax, by - ay
+            length = dx * dx + dy * dy
+            share = min(max(((x - ax) * dx + (y - ay) * dy) / length, 0.0), 1.0) if length > 0.0 else 0.0
+            off = (x - ax - share * dx) ** 2 + (y - ay - share * dy) ** 2
+            if off <= reach * reach:
+                out[p] = m
+                break

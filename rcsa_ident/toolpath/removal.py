@@ -13,6 +13,7 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Shown
 from rcsa_ident.toolpath._dexel_kernels import cut_leaning, sweep_upright
 from rcsa_ident.toolpath._engagement_kernels import distance_at
+from rcsa_ident.toolpath._surface_kernels import last_move
 from rcsa_ident.toolpath.dexel import GRIDS, DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.solid import ToolSolid
@@ -138,6 +139,26 @@ class Sweep(Shown):
             for grid, axes in enumerate(_AXES):
                 while not cut_leaning(self.field.segs[grid], self.field.counts[grid], axes, lattice, frame, tip, outline, self.told[move]):
                     self.field.make_room()
+
+
+def made_by(points: FloatArray, path: ToolPath, moves: np.ndarray, radius: float, near: float) -> np.ndarray:
+    """Return the last of some moves that passed each point of a surface, shape (v,); -1 where none did.
+
+    Parameters
+    ----------
+    points : array, shape (v, 3) [m]
+    path : ToolPath
+        Of an upright tool.
+    moves : array of int
+        Ascending.
+    radius : float [m]
+        Of the tool.
+    near : float [m]
+        How far a point may lie beside the tool's wall or below its tip.
+    """
+    found = np.full(len(points), -1, dtype=np.int64)
+    last_move(np.ascontiguousarray(points), np.ascontiguousarray(path.places), np.asarray(moves), radius + near, near, found)
+    return found
 
 
 def frame_of(axis: FloatArray) -> FloatArray:

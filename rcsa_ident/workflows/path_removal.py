@@ -10,7 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.machining_setup import BareCutter, Tooling
 from rcsa_ident.shown import Shown
 from rcsa_ident.toolpath.dexel import DexelField, memory_of
 from rcsa_ident.toolpath.engagement import PathEngagement, engagement_along
@@ -83,16 +83,50 @@ def default_cell(radius: float, size: FloatArray) -> float:
     return cell
 
 
+def solid_of(tooling: Tooling) -> ToolSolid:
+    """Return what a tooling sweeps up to its stickout; of a cutter alone, up to where its edges end."""
+    return ToolSolid.of(tooling.cutter, None if isinstance(tooling, BareCutter) else tooling.assembly.stickout)
+
+
+def field_of(tooling: Tooling, block: Block | None = None, surface: Surface | None = None, cell: float | None = None) -> DexelField:
+    """Return stock for a tooling: a block, or the inside of a surface.
+
+    Parameters
+    ----------
+    tooling : Tooling
+    block : pair of arrays, shape (3,) [m]
+    surface : pair of arrays, shape (v, 3) [m] and (f, 3)
+        Instead of the block.
+    cell : float or None [m]
+        Between lines of material, by default a twentieth of the tool's radius (`default_cell`).
+
+    Raises
+    ------
+    InputError
+        If the lines would not fit into memory, or the surface is not closed.
+    """
+    if (block is None) == (surface is None):
+        raise InputError("stock", "none" if block is None else "two", "a block or a surface")
+    if block is not None:
+        low, high = (np.asarray(corner, dtype=float) for corner in block)
+    else:
+        assert surface is not None
+        low, high = surface[0].min(axis=0), surface[0].max(axis=0)
+    cell = default_cell(solid_of(tooling).radius, high - low) if cell is None else positive("cell", cell, "m")
+    if memory_of(high - low, cell) > _MOST_MEMORY:
+        found = f"{1e3 * cell:g} mm, for which the stock takes {memory_of(high - low, cell) / 1e9:.3g} GB"
+        raise InputError("cell", found, f"cells for which it takes at most {_MOST_MEMORY / 1e9:g} GB")
+    return DexelField.block(low, high, cell) if surface is None else DexelField.from_mesh(*surface, cell)
+
+
 def remove_along(
     tooling: Tooling,
     path: ToolPath,
-    block: Block | None = None,
-    surface: Surface | None = None,
-    cell: float | None = None,
+    field: DexelField,
     step: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PathRemoval:
-    """Return what a tooling takes out of a block, or out of the inside of a surface, along a path.
+    """Return what a tooling takes out of its stock along a path.
 
     Parameters
     ----------
@@ -100,11 +134,8 @@ def remove_along(
         Its cutter takes out what its outline sweeps up to the stickout; its holder should touch nothing.
     path : ToolPath
         Of its tip.
-    block : pair of arrays, shape (3,) [m]
-    surface : pair of arrays, shape (v, 3) [m] and (f, 3)
-        Instead of the block.
-    cell : float or None [m]
-        Between lines of material, by default a twentieth of the tool's radius (`default_cell`).
+    field : DexelField
+        The stock (`field_of`); it is cut.
     step : float or None [m]
         Between places at which the engagement is found, by default a tenth of the tool's radius.
     progress : callable or None
@@ -113,21 +144,11 @@ def remove_along(
     Raises
     ------
     InputError
-        If the lines would not fit into memory, or if path and stock lie so far apart that a unit or an origin is wrong.
+        If path and stock lie so far apart that a unit or an origin is wrong.
     """
-    if (block is None) == (surface is None):
-        raise InputError("stock", "none" if block is None else "two", "a block or a surface")
-    solid = ToolSolid.of(tooling.cutter, tooling.assembly.stickout)
-    if block is not None:
-        low, high = (np.asarray(corner, dtype=float) for corner in block)
-    else:
-        assert surface is not None
-        low, high = surface[0].min(axis=0), surface[0].max(axis=0)
-    warnings = list(_misplaced(solid, path, low, high))
-    cell = default_cell(solid.radius, high - low) if cell is None else positive("cell", cell, "m")
-    if memory_of(high - low, cell) > _MOST_MEMORY:
-        found = f"{1e3 * cell:g} mm, for which the stock takes {memory_of(high - low, cell) / 1e9:.3g} GB"
-        raise InputError("cell", found, f"cells for which it takes at most {_MOST_MEMORY / 1e9:g} GB")
+    solid = solid_of(tooling)
+    warnings = list(_misplaced(solid, path, field.low, field.high))
+    cell = float(field.cell.max())
     if cell > CELL * solid.radius * 1.001:
         warnings.append(
             f"the distance between lines, {1e3 * cell:.3g} mm, is more than a twentieth of the tool's radius: less exact angles"
@@ -136,7 +157,6 @@ def remove_along(
     if path.length / step > MOST_PLACES:
         raise InputError("step", f"{1e3 * step:g} mm on a path of {path.length:g} m", f"steps that make at most {MOST_PLACES} places")
     start = time.perf_counter()
-    field = DexelField.block(low, high, cell) if surface is None else DexelField.from_mesh(*surface, cell)
     fine = path.resampled(step)
     before = field.volume
     sweep = Sweep(field, solid, fine)

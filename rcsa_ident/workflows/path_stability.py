@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,7 +18,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.lobes import both_directions, stability_lobes
+from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.surface_error import forced_vibration, surface_location_error
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.engagement import PathEngagement
@@ -180,7 +182,12 @@ def cuts_along(
         station = stations(move)
         rows["depth"][move] = depth
         rows["feed"][move] = 2.0 * np.pi * path.feed[move + 1] / (teeth * speed[move])
-        key = id(station.machine), _rounded(station, engagement, depth), round(speed[move], 6), round(1e9 * rows["feed"][move])
+        key: tuple[object, ...] = (
+            id(station.machine),
+            _rounded(station, engagement, depth),
+            round(speed[move], 6),
+            round(1e9 * rows["feed"][move]),
+        )
         groups.setdefault(key, []).append(move)
         cuts.setdefault(key, (station, engagement, depth))
     warnings: list[str] = []
@@ -236,16 +243,17 @@ def plain(found: EngagementMap) -> tuple[AnyEngagement, float]:
     One arc in front of the tool that is the same at all heights, to `SAME_ANGLE`, is an `Engagement` over the height of the material; all
     else stays a map, up to its top.
     """
-    start, end, z = found.start, found.end, found.z
+    # arcs that end within a degree of 0 or 180 end there: a wall is left
+    near, z = 0.5 * SAME_ANGLE, found.z
+    start = np.where(found.start < near, 0.0, found.start)
+    end = np.where(np.abs(found.end - np.pi) < near, np.pi, found.end)
+    start, end = np.minimum(start, end), end
     alone = np.unique(z).size == z.size and found.feed_rise == 0.0
     if alone and np.ptp(start) <= SAME_ANGLE and np.ptp(end) <= SAME_ANGLE:
-        # arcs that end within a degree of 0 or 180 end there: a wall is left
-        near = 0.5 * SAME_ANGLE
-        entry, leave = float(np.mean(start)), float(min(np.mean(end), np.pi))
-        entry, leave = (0.0 if entry < near else entry), (np.pi if leave > np.pi - near else leave)
+        entry, leave = float(np.mean(start)), min(float(np.mean(end)), np.pi)
         if leave > entry:
             return Engagement(entry, leave), float(z[-1] - z[0])
-    return found, float(z[-1])
+    return EngagementMap(z, start, end, found.feed_rise), float(z[-1])
 
 
 def _rounded(station: Station, engagement: AnyEngagement, depth: float) -> tuple[object, ...]:
@@ -288,10 +296,12 @@ class _Answer:
         # from the machine's axes into the feed's
         force[:, :2] = force[:, :2] @ process.machine_from_feed
         moved, error = np.nan, np.nan
+        plane = tip if isinstance(tip, TipModes) else both_directions(tip)
         if margin >= 1.0:
-            moved = float(np.max(np.linalg.norm(forced_vibration(tip, process, speed, depth), axis=1)))
-            if isinstance(process.engagement, Engagement) and (process.engagement.entry == 0.0 or process.engagement.exit == np.pi):
-                error = float(surface_location_error(tip, process, np.array([speed]), depth).mean[0])
+            moved = float(np.max(np.linalg.norm(forced_vibration(plane, process, speed, depth), axis=1)))
+            # no wall is left by most cuts of a shape, and by cuts in the middle of the material
+            with suppress(InputError):
+                error = float(surface_location_error(plane, process, np.array([speed]), depth).mean[0])
         peak = float(np.max(np.linalg.norm(force[:, :2], axis=1)))
         return cls(margin, low, chatter, force.mean(axis=0), peak, moved, error, warnings)
 
@@ -301,7 +311,7 @@ def _margin(
 ) -> tuple[float, float, float, Sequence[str]]:
     """How far a cut is from chatter, what drawn machines reach, the frequency of chatter, and what speaks against it."""
 
-    def lobes(of: MillingProcess, deepest: float, draws: int = 0):  # type: ignore[no-untyped-def]
+    def lobes(of: MillingProcess, deepest: float, draws: int = 0) -> StabilityLobes:
         return stability_lobes(tip, of, change.speeds, deepest, change.method, draws)
 
     if isinstance(process.engagement, Engagement):
@@ -310,7 +320,7 @@ def _margin(
         low = margin if found.drawn is None else min(float(found.limit_quantile(0.95)[0]) / depth, margin)
         return margin, low, float(found.chatter_frequency[0]), found.warnings
 
-    def stronger(times: float):  # type: ignore[no-untyped-def]
+    def stronger(times: float) -> StabilityLobes:
         c = process.coefficients
         return lobes(replace(process, coefficients=replace(c, tangential=times * c.tangential)), depth)
 
@@ -322,9 +332,9 @@ def _margin(
         middle = float(np.sqrt(stable * unstable))
         found = stronger(middle)
         if np.isfinite(found.limit_depth[0]):
-            stable = middle
-        else:
             unstable, at = middle, found
+        else:
+            stable = middle
     return stable, stable, float(at.chatter_frequency[0]), at.warnings
 
 

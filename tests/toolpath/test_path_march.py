@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rcsa_ident.toolpath.dexel import DexelField
-from rcsa_ident.toolpath.removal import Sweep
-from rcsa_ident.toolpath.solid import ToolSolid
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.errors import InputError
+from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.march import Carrier, Cut, mill_block
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from rcsa_ident.toolpath.path_march import MarchOptions, MilledPart, mill_along
+from rcsa_ident.toolpath.removal import Sweep
+from rcsa_ident.toolpath.solid import ToolSolid
 from rcsa_ident.toolpath.walls import PathFrame
 
 CUTTER = Cutter(2, 0.01, np.radians(30.0), pitch=np.radians([170.0, 190.0]))

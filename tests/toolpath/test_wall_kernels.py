@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rcsa_ident.toolpath.dexel import DexelField
 
 from rcsa_ident.toolpath import _wall_kernels as kernels
+from rcsa_ident.toolpath.dexel import DexelField
 
 NOTHING = -1.0
 
