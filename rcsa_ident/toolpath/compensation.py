@@ -8,19 +8,32 @@ of the commanded path shows is taken off it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from enum import StrEnum
 from typing import TypeVar
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, positive
 
-Place = TypeVar("Place")
+#: Largest correction of a place [m]: one that is asked for more is not understood.
+LARGEST = 2e-3
+Sent = TypeVar("Sent")
+
+
+class Place(StrEnum):
+    """What became of a place that was to be corrected."""
+
+    CORRECTED = "corrected"
+    RAPID = "not corrected: a rapid move"
+    SATURATED = "saturated: corrected by the largest that is allowed"
+    JOINT_RANGE = "not corrected: the corrected place is beyond the joints' range"
+    OUT_OF_REACH = "not corrected: the corrected place is out of the arm's reach"
 
 
 def ahead_of_force(
-    angles: FloatArray, torques: FloatArray, twist: Callable[[FloatArray], FloatArray], place: Callable[[FloatArray], Place]
-) -> Sequence[Place]:
+    angles: FloatArray, torques: FloatArray, twist: Callable[[FloatArray], FloatArray], place: Callable[[FloatArray], Sent]
+) -> Sequence[Sent]:
     """Return the places to command along a path, q + K^-1 tau, play to the torque's side.
 
     Parameters
@@ -70,3 +83,16 @@ def mirrored(places: FloatArray, reached: Callable[[FloatArray], FloatArray], pa
     for _ in range(passes):
         commanded = commanded - (reached(commanded) - places)
     return commanded
+
+
+def limited(correction: FloatArray, largest: float) -> tuple[FloatArray, np.ndarray]:
+    """Return corrections, shape (k, 3) [m], none longer than the largest [m], and which ones were.
+
+    Examples
+    --------
+    >>> limited(np.array([[3e-3, 0.0, 4e-3], [1e-3, 0.0, 0.0]]), 2.5e-3)[0].tolist()
+    [[0.0015, 0.0, 0.002], [0.001, 0.0, 0.0]]
+    """
+    size = np.linalg.norm(correction, axis=1, keepdims=True)
+    longer = size > positive("largest correction", largest, "m")
+    return np.where(longer, correction * (largest / np.where(longer, size, 1.0)), correction), longer[:, 0]
