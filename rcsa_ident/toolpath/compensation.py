@@ -8,6 +8,7 @@ of the commanded path shows is taken off it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
@@ -15,6 +16,8 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.toolpath.deviation import Deviation
+from rcsa_ident.toolpath.path import ToolPath
 
 #: Largest correction of a place [m]: one that is asked for more is not understood.
 LARGEST = 2e-3
@@ -29,6 +32,42 @@ class Place(StrEnum):
     SATURATED = "saturated: corrected by the largest that is allowed"
     JOINT_RANGE = "not corrected: the corrected place is beyond the joints' range"
     OUT_OF_REACH = "not corrected: the corrected place is out of the arm's reach"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompensatedPath:
+    """A path to command, and what it leaves.
+
+    Parameters
+    ----------
+    path : ToolPath
+    correction : array, shape (k, 3) [m]
+    became : tuple of Place
+        Of each place.
+    controller, before, after : Deviation
+        Of drives that give way to nothing; of the path as it was and of the commanded one, on the machine that compensates.
+    draws : tuple of Deviation
+        Of the commanded path on other machines that what is known allows.
+    postures : array, shape (k, j) [rad], or None
+        Of an arm's drives along it.
+    loose : array, shape (k,) [m], or None
+        How far an arm's tool may be to either side within the play of drives that no torque holds on one.
+    """
+
+    path: ToolPath
+    correction: FloatArray
+    became: tuple[Place, ...]
+    controller: Deviation
+    before: Deviation
+    after: Deviation
+    draws: tuple[Deviation, ...] = ()
+    postures: FloatArray | None = None
+    loose: FloatArray | None = None
+
+    @property
+    def limited(self) -> tuple[int, ...]:
+        """Places, from 0, that are corrected by less than asked for, or not at all."""
+        return tuple(k for k, each in enumerate(self.became) if each not in (Place.CORRECTED, Place.RAPID))
 
 
 def ahead_of_force(

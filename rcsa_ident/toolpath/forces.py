@@ -80,8 +80,10 @@ class ForceAlongPath:
 
     def check_places(self, places: FloatArray, path: ToolPath) -> None:
         """Refuse forces that were found at other places, shape (m, 3) [m], than the tool has on a path at their instants."""
-        along = np.stack([np.interp(self.time, *_rising(path.times, own)) for own in path.places.T], axis=1)
-        away = np.linalg.norm(places - along, axis=1)
+        # where a rapid move takes no time the tool is at both of its ends
+        ends = [np.append(True, np.diff(path.times) > 0.0), np.append(np.diff(path.times) > 0.0, True)]
+        along = [np.stack([np.interp(self.time, path.times[kept], own) for own in path.places[kept].T], axis=1) for kept in ends]
+        away = np.min([np.linalg.norm(places - own, axis=1) for own in along], axis=0)
         worst = int(np.argmax(away))
         if away[worst] > _NEAR:
             found = f"{1e3 * away[worst]:.1f} mm from the path at {self.time[worst]:.3f} s"
@@ -128,9 +130,3 @@ def on_all_moves(path: ToolPath, force: FloatArray, of_path: bool = False) -> Fo
     if not instants:
         raise InputError("path", "no move", "one or more at a feed")
     return ForceAlongPath(np.array(instants), np.array(forces))
-
-
-def _rising(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """One value an instant, the last of those that take no time."""
-    kept = np.append(np.diff(times) > 0.0, True)
-    return times[kept], values[kept]

@@ -17,7 +17,7 @@ from rcsa_ident.machine.robot.kinematics import postures_of, tool_point_at
 from rcsa_ident.machine.robot.motion import ArmUnderForce
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.toolpath.blending import Controller, QuadraticBlend
-from rcsa_ident.toolpath.compensation import LARGEST, Place, ahead_of_force, limited, mirrored
+from rcsa_ident.toolpath.compensation import LARGEST, CompensatedPath, Place, ahead_of_force, limited, mirrored
 from rcsa_ident.toolpath.deviation import Deviation
 from rcsa_ident.toolpath.forces import ForceAlongPath
 from rcsa_ident.toolpath.path import ToolPath
@@ -219,42 +219,6 @@ class Mirror:
         return mirrored(task.path.places, reached, self.passes)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CompensatedPath:
-    """A path to command, and what it leaves.
-
-    Parameters
-    ----------
-    path : ToolPath
-    postures : array, shape (k, 6) [rad]
-        Of the drives along it.
-    correction : array, shape (k, 3) [m]
-    became : tuple of Place
-        Of each place.
-    controller, before, after : Deviation
-        Of drives that give way to nothing; of the path as it was and of the commanded one, on the arm that compensates.
-    draws : tuple of Deviation
-        Of the commanded path on other arms that what is known allows.
-    loose : array, shape (k,) [m]
-        How far the tool may be to either side within the play of drives that no torque holds on one.
-    """
-
-    path: ToolPath
-    postures: FloatArray
-    correction: FloatArray
-    became: tuple[Place, ...]
-    controller: Deviation
-    before: Deviation
-    after: Deviation
-    draws: tuple[Deviation, ...]
-    loose: FloatArray
-
-    @property
-    def limited(self) -> tuple[int, ...]:
-        """Places, from 0, that are corrected by less than asked for, or not at all."""
-        return tuple(k for k, each in enumerate(self.became) if each not in (Place.CORRECTED, Place.RAPID))
-
-
 def compensate(task: RobotPath, method: Method, largest: float = LARGEST, arms: Sequence[FlexibleRobot] = ()) -> CompensatedPath:
     """Return the path to command so that the tool goes where the task's path has it.
 
@@ -291,12 +255,12 @@ def compensate(task: RobotPath, method: Method, largest: float = LARGEST, arms: 
 
     return CompensatedPath(
         task.path.through(task.path.places + correction),
-        postures,
         correction,
         tuple(became),
         Deviation.of(task.path, followed, followed),
         left(task, task.postures),
         left(task, postures),
         tuple(left(task.on(arm), postures) for arm in arms),
+        postures,
         task.ahead_of_forces[1],
     )
