@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Shares of the draws between which a band lies.
 _BAND = (5.0, 95.0)
+#: How far forces may end from the path's end without a word, as a share of its time.
+_SAME_TIME = 0.02
 
 
 class MethodName(StrEnum):
@@ -103,7 +105,7 @@ def compensate(
         writable(joints, "--joints")
         if not arm:
             raise InputError("--joints", str(machine), "an arm: a machine has no joints to turn")
-    warnings: list[str] = []
+    warnings = _other_times(force, told)
     with stages.stage("compensation"):
         if arm:
             if posture is None:
@@ -158,6 +160,14 @@ def _forces(text: str, path: ToolPath, axes: ForceAxes) -> ForceAlongPath:
     return on_all_moves(path, np.array(steady), axes is ForceAxes.path)
 
 
+def _other_times(force: ForceAlongPath, path: ToolPath) -> list[str]:
+    """What speaks against forces of another time, in words."""
+    last, taken = float(force.time[-1]), float(path.times[-1])
+    if force.time.size < 2 or abs(last - taken) <= _SAME_TIME * taken:
+        return []
+    return [f"the forces end at {last:.2f} s, the path at {taken:.2f} s; beyond their ends they are held"]
+
+
 def _on_arm(
     machine: Path,
     tool: Tooling,
@@ -184,6 +194,8 @@ def _on_arm(
     name, passes = method
     found = compensate(task, IdealForce() if name is MethodName.ideal_force else Mirror(passes), largest, others)
     said = list(robot.model.warnings)
+    if not robot.model.weighed:
+        said.append("no masses of the arm are known: it is taken to rest at every place, without weight and inertia")
     loose = found.loose
     if loose is not None and np.any(loose > 0.0):
         count, most = int(np.sum(loose > 0.0)), 1e3 * float(np.max(loose))

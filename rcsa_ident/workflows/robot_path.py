@@ -15,6 +15,7 @@ from rcsa_ident.machine.robot.compliance import PLAY_HELD
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.kinematics import postures_of, tool_point_at
 from rcsa_ident.machine.robot.motion import ArmUnderForce
+from rcsa_ident.tool_holder.clamped import bending_at_rest
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.toolpath.blending import Controller, QuadraticBlend
 from rcsa_ident.toolpath.compensation import LARGEST, CompensatedPath, Place, ahead_of_force, limited, mirrored
@@ -24,7 +25,7 @@ from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.workflows.robot_postures import flange_for, following
 
 #: Time step, and how many of them a stretch may take.
-STEP, MOST_STEPS = 1e-3, 2_000_000
+STEP, MOST_STEPS = 1e-3, 1_000_000
 #: Places that a path may have once it is cut into short moves.
 MOST_PLACES = 50_000
 #: A correction that turns a joint further takes another of the arm's postures [rad].
@@ -41,7 +42,7 @@ class RobotPath:
     start : array, shape (6,) [rad]
         Near the first place's posture.
     assembly : ToolAssembly
-        The tool-holder and the tool, taken for rigid.
+        The tool-holder and the tool; they bend as they do at rest, clamped to the arm.
     path : ToolPath
         Of the tool's tip in the base's axes; its places are those that are corrected.
     force : ForceAlongPath
@@ -119,14 +120,29 @@ class RobotPath:
     def gone(self, postures: FloatArray) -> FloatArray:
         """Return where the tip is at the path's places when drives are sent through postures (k, 6), shape (k, 3) [m].
 
-        A march through time for each stretch at a feed, from rest; beside them the places are those that the drives are sent to.
+        A march through time for each stretch at a feed, from rest; beside them the places are those that the drives are sent to. An arm of
+        which no masses are known is at rest at each place.
         """
         tips = np.array([self.arm.tip(each) for each in postures])
         for stretch in self.stretches:
             instants, held = self.sent(stretch, postures)
-            angles = self.arm.along(held, self.force.at(instants - self.controller.delay), self.step)
-            tips[stretch] = [self.arm.tip(each) - self.sunk for each in self._late(stretch, instants, angles)]
+            forces = self.force.at(self.path.times[stretch])
+            if self.robot.model.weighed:
+                marched = self.arm.along(held, self.force.at(instants - self.controller.delay), self.step)
+                angles = self._late(stretch, instants, marched)
+            else:
+                angles = np.array([self.arm.at_rest(*each) for each in zip(self._late(stretch, instants, held), forces, strict=True)])
+            tips[stretch] = [self.arm.tip(each) - self.sunk for each in angles] + self.bent(stretch)
         return tips
+
+    def bent(self, stretch: slice) -> FloatArray:
+        """Return how far the tool's tip is bent aside at the places of a stretch, shape (m, 3) [m]."""
+        forces, axes = self.force.at(self.path.times[stretch]), self.path.axes[stretch]
+        return self._bending * (forces - np.sum(forces * axes, axis=1, keepdims=True) * axes)
+
+    @cached_property
+    def _bending(self) -> float:
+        return bending_at_rest(self.assembly)
 
     def sent_to(self, places: FloatArray) -> tuple[FloatArray, list[Place]]:
         """Return postures for places, shape (k, 6) [rad], each the nearest to the ideal one, and what became of each.
@@ -179,7 +195,10 @@ class RobotPath:
         for k in np.flatnonzero(moving):
             free = np.where(np.abs(asked[k]) < PLAY_HELD, self.arm.play, 0.0)
             loose[k] = np.linalg.norm(np.abs(self.arm.motion(full[k])) @ free)
-        return np.array(places) + self.sunk, loose
+        commanded = np.array(places) + self.sunk
+        for stretch in self.stretches:
+            commanded[stretch] -= self.bent(stretch)
+        return commanded, loose
 
 
 class Method(Protocol):

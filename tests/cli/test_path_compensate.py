@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -86,6 +87,10 @@ def test_forces_over_time_stand_at_their_places(program, tmp_path):
     steady = told(KR210, TOOL, program, "--forces", "-58 -130 35", *NEAR, "--out", tmp_path / "OTHER.csv")
     assert answer["before"] == pytest.approx(steady["before"], rel=1e-6)
     np.testing.assert_allclose(read_tool_path(out).places, read_tool_path(tmp_path / "OTHER.csv").places, atol=1e-9)
+    assert answer["warnings"] == steady["warnings"]
+    np.savetxt(file, rows[:200], delimiter=",", header=header, comments="")
+    short = told(KR210, TOOL, program, "--forces", file, *NEAR, "--out", out)
+    assert "the forces end at 0.80 s, the path at 1.60 s" in short["warnings"][0]
     rows[:, 2] += 30.0
     np.savetxt(file, rows, delimiter=",", header=header, comments="")
     wrong = run(KR210, TOOL, program, "--forces", file, *NEAR, "--out", out)
@@ -97,6 +102,15 @@ def test_forces_may_turn_with_the_path(program, tmp_path):
     out = tmp_path / "OUT.csv"
     told(KR210, TOOL, program, "--forces", "-100 50 20", "--force-axes", "path", *NEAR, "--out", out)
     assert len(read_tool_path(out)) > 80
+
+
+def test_an_arm_without_masses_is_taken_at_rest(program, tmp_path):
+    light = tmp_path / "LIGHT.toml"
+    text = KR210.read_text()
+    light.write_text(re.sub(r"\[joints\.link\]\nmass_kg.*\ncenter.*\ninertia.*\n", "", text))
+    answer = told(light, TOOL, program, "--forces", "-58 -130 35", *NEAR, "--out", tmp_path / "OUT.nc")
+    assert any("no masses" in each for each in answer["warnings"])
+    assert answer["after"]["straight_rms_mm"] < 0.1 * answer["before"]["straight_rms_mm"]
 
 
 def test_what_is_told_of_a_limit(program, tmp_path):

@@ -10,6 +10,7 @@ from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.kinematics import tool_point_at
 from rcsa_ident.machine.robot.motion import ArmUnderForce
+from rcsa_ident.tool_holder.clamped import bending_at_rest
 from rcsa_ident.toolpath.blending import FirstOrderLag, QuadraticBlend
 from rcsa_ident.toolpath.compensation import Place
 from rcsa_ident.toolpath.forces import ForceAlongPath, on_all_moves
@@ -99,7 +100,7 @@ def test_at_rest_it_is_the_static_method(assembly):
     tool = tool_point_at(task.robot.model, task.postures[2])
     pushed[3:] = np.cross(length * tool.turn[:, 2], SLOT[0])
     commanded = at_rest_ahead(task.robot, task.postures[2:3], pushed[None])[0]
-    np.testing.assert_allclose(task.arm.tip(commanded), found.path.places[2], atol=2e-6)
+    np.testing.assert_allclose(task.arm.tip(commanded), found.path.places[2] + task.bent(task.stretches[0])[2], atol=2e-6)
     # the tool's direction is not commanded: what that leaves is of second order
     assert found.after.rms < 0.1e-6
     assert compensate(task, Mirror(2)).after.rms < 0.05e-6
@@ -189,6 +190,26 @@ def test_what_cannot_be_is_refused(assembly):
         compensate(replace(task, step=1e-6), IdealForce())
     with pytest.raises(InputError, match="places"):
         replace(task, path=task.path.resampled(1e-6))
-    bare = replace(robot("kr210"), joints=tuple(replace(j, body=j.body.times(0.0)) for j in robot("kr210").joints))
+
+
+def test_an_arm_without_masses_is_at_rest_at_each_place(assembly):
+    """As the weightless arm that moves slowly."""
+    model = arm(play=False).model
+    bare = FlexibleRobot(replace(model, joints=tuple(replace(j, body=j.body.times(0.0)) for j in model.joints)))
     with pytest.raises(InputError, match="masses"):
-        compensate(replace(task, robot=FlexibleRobot(bare)), IdealForce())
+        ArmUnderForce(bare, 0.1).along(np.tile(POSTURE, (3, 1)), np.zeros((3, 3)), 1e-3)
+    task = task_of(assembly, play=False, weight=False)
+    quick, still = (compensate(each, IdealForce()) for each in (task, replace(task, robot=bare)))
+    far = quick.after.straight & (np.abs(task.path.times - 2.0) > 0.6) & (np.abs(task.path.times - 2.0) < 1.6)
+    np.testing.assert_allclose(still.before.across[far], quick.before.across[far], atol=3e-6)
+    assert still.after.rms < 0.02 * still.before.rms
+
+
+def test_a_tool_that_bends_moves_its_tip(assembly):
+    task = task_of(assembly, play=False, weight=False)
+    stretch = task.stretches[0]
+    bent = task.bent(stretch)
+    axis = task.path.axes[0]
+    np.testing.assert_allclose(bent @ axis, 0.0, atol=1e-18)
+    across = SLOT[0] - axis * (axis @ SLOT[0])
+    np.testing.assert_allclose(bent[5], bending_at_rest(assembly) * across, rtol=1e-6)

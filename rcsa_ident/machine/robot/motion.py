@@ -38,10 +38,6 @@ class ArmUnderForce:
     reach: float
     weight: bool = True
 
-    def __post_init__(self) -> None:
-        if not self.robot.model.weighed:
-            raise InputError("link masses", "nothing", "mass, centre and inertia of the links: without them nothing moves")
-
     @property
     def gravity(self) -> FloatArray:
         """Acceleration of free fall that acts [m/s^2]."""
@@ -135,9 +131,11 @@ class ArmUnderForce:
         Raises
         ------
         InputError
-            If an instant has no solution: a motion or a force that the springs do not follow.
+            If no masses are known, or an instant has no solution: a motion or a force that the springs do not follow.
         """
         positive("step", step, "s")
+        if not self.robot.model.weighed:
+            raise InputError("link masses", "nothing", "mass, centre and inertia of the links: without them nothing moves")
         chain = self.robot.model.chain(self.robot.tilts)
         held, force = np.asarray(held, dtype=float), np.ascontiguousarray(force, dtype=float)
         if held.ndim != 2 or held.shape[1] != chain.driven.size or force.shape != (len(held), 3):
