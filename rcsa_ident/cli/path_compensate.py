@@ -90,8 +90,9 @@ def compensate(
     json_: Json = False,
 ) -> None:
     """Correct a path so that the tool cuts where it should though arm or machine give way, and tell what is left and where it ends."""
+    from rcsa_ident.io.gcode import kept_words
     from rcsa_ident.io.path_forces import write_joints
-    from rcsa_ident.io.paths import check_path_name, read_tool_path, write_tool_path
+    from rcsa_ident.io.paths import PROGRAMS, check_path_name, read_tool_path, write_tool_path
     from rcsa_ident.io.setups import read_tooling
 
     writable(out)
@@ -119,7 +120,11 @@ def compensate(
                 raise InputError("--posture", posture, "none: a machine has no joints to turn")
             found, said = _on_machine(machine, tool, along, force, most, draws, seed)
         warnings += said
-    write_tool_path(out, found.path, decimals)
+    kept, led = kept_words(path) if path.suffix.lower() in PROGRAMS else ([], [])
+    if led:
+        lines = ", ".join(map(str, led[:5])) + (f" and {len(led) - 5} further" if len(led) > 5 else "")
+        warnings.append(f"G28, G30 or G53 in line {lines}: nobody knows where they lead, they are not in the written path")
+    write_tool_path(out, found.path, decimals, kept)
     if joints is not None and found.postures is not None:
         write_joints(joints, along.times, found.postures)
     _tell(found, along, warnings, {"method": str(method), "seconds": stages.seconds, "out": str(out)}, joints, json_)

@@ -104,6 +104,16 @@ def test_forces_may_turn_with_the_path(program, tmp_path):
     assert len(read_tool_path(out)) > 80
 
 
+def test_a_program_keeps_what_its_machine_needs(tmp_path):
+    program, out = tmp_path / "PATH.nc", tmp_path / "OUT.nc"
+    program.write_text(PROGRAM.replace("G0 Z880\n", "T3 M6\nG43 H3 Z880\nM8\n") + "M9\nG91 G28 Z0\nM30\n")
+    answer = told(KR210, TOOL, program, "--forces", "-58 -130 35", *NEAR, "--out", out)
+    lines = out.read_text().splitlines()
+    order = [lines.index(each) for each in ("M3 S8000", "M6 T3", "G43 H3", "M8", "M9", "M30")]
+    assert order == sorted(order)
+    assert any("G53 in line 10:" in each for each in answer["warnings"])
+
+
 def test_an_arm_without_masses_is_taken_at_rest(program, tmp_path):
     light = tmp_path / "LIGHT.toml"
     text = KR210.read_text()
