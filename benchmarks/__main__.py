@@ -30,6 +30,7 @@ CLAIMS = (
     "bad_input",
     "robot",
     "urdf",
+    "compensation",
 )
 #: Each is a module with ``main(arguments)``.
 STUDIES = (

@@ -29,6 +29,7 @@ from rcsa_ident.cli import (  # noqa: E402
     lobes,
     machine,
     path,
+    path_compensate,
     path_cut,
     plan,
     ring,
@@ -100,7 +101,7 @@ _OF_ROBOTS = robot.COMMANDS | robot_draw.COMMANDS | robot_import.COMMANDS | robo
 for _name, _command in _OF_ROBOTS.items():
     robot.robot_app.command(_name, cls=_Literal)(_command)
 app.add_typer(robot.robot_app, name="robot", rich_help_panel="Milling robots")
-for _name, _command in (path.COMMANDS | path_cut.COMMANDS).items():
+for _name, _command in (path.COMMANDS | path_cut.COMMANDS | path_compensate.COMMANDS).items():
     path.path_app.command(_name, cls=_Literal)(_command)
 app.add_typer(path.path_app, name="path", rich_help_panel="Tool paths")
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import io
 import math
-import re
 from array import array
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from gcodeparser import parse_parameters
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
+from rcsa_ident.io.gcode_blocks import KINDS, block_of, words_of
 from rcsa_ident.io.text_columns import decoded
 from rcsa_ident.toolpath.arcs import centre_of, chord_count, chords, turned
 from rcsa_ident.toolpath.path import RAPID, ToolPath
@@ -23,46 +23,12 @@ from rcsa_ident.units import from_rpm, to_rpm
 LARGEST_PROGRAM = 100 * MEGABYTE
 #: Places that a program may lead to, chords of arcs counted; and lines that it may have.
 MOST_PLACES = 2_000_000
-_LONGEST_LINE = 1000
-#: Numbers beyond it are no lengths in a machine [mm].
-_LARGEST_NUMBER = 1e7
 _INCH = 25.4
+#: M words that end a program, and those that act behind the move of their line.
+_ENDS, _BEHIND = (2, 30), (0, 1, 5, 9, 60)
 
-_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
-_WORDS = re.compile(rf"(?:[A-Z]{_NUMBER})*")
-_CODES = re.compile(rf"([GM])({_NUMBER})")
-_COMMENT = re.compile(r"\([^()]*\)")
-#: A point that no digit follows: the tokeniser takes it for a whole number and fails.
-_BARE_POINT = re.compile(r"\.(?!\d)")
-_LABEL = re.compile(r"[O:]\d+")
-_NUMBERED = re.compile(r"N\d+\.?")
-
-#: Codes by what they set; of one kind a line has one.
-_KINDS: dict[str, tuple[float, ...]] = {
-    "motion": (0, 1, 2, 3, 80),
-    "plane": (17, 18, 19),
-    "unit": (20, 21),
-    "distance": (90, 91),
-    "centre": (90.1, 91.1),
-    "single": (4, 28, 30, 53),
-    "system": (54, 55, 56, 57, 58, 59),
-    # none of these moves a place: cancelled corrections, a tool's length, exact stops and smoothing, feed per minute, speed in rev/min
-    "told": (5.1, 9, 15, 40, 43, 49, 50, 61, 61.1, 62, 64, 69, 94, 97, 98, 99),
-}
-_KIND = {code: kind for kind, codes in _KINDS.items() for code in codes}
-#: Why codes are refused that would change the path.
-_REFUSED: dict[float, str] = {
-    41: "a path of the tool's centre, written without radius correction",
-    42: "a path of the tool's centre, written without radius correction",
-    93: "feeds per minute, G94",
-    95: "feeds per minute, G94",
-    96: "speeds in rev/min, G97",
-    **dict.fromkeys((73, 74, 76, *range(81, 90)), "moves by G0 to G3 instead of canned cycles"),
-}
-_SUBPROGRAMS = (96, 97, 98, 99)
 _PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 _AXES, _OFFSETS = "XYZ", "IJK"
-_LETTERS = "XYZIJKRFSTHDPQ"
 
 
 def read_gcode(path: str | Path, tolerance: float = 1e-6) -> ToolPath:
@@ -97,45 +63,80 @@ def gcode_of(text: str, where: str, tolerance: float = 1e-6) -> ToolPath:
     (0.12, [1, 2, 3])
     """
     program = _Program(positive("tolerance", tolerance, "m"))
-    begun = False
-    for number, line in enumerate(io.StringIO(text), start=1):
+    for number, block in _blocks(text, where):
         try:
-            if number > MOST_PLACES:
-                raise InputError("lines", f"more than {MOST_PLACES}", f"at most {MOST_PLACES}")
-            block = _block(line)
-            if block == "%":
-                if begun:
-                    break
-                continue
-            begun = begun or bool(block)
-            if block and program.run(block, number):
+            if program.run(block, number):
                 break
         except InputError as error:
             raise error.at(f"{where} line {number}") from None
     return program.path(where)
 
 
-def _block(line: str) -> str:
-    """A line without comments, blanks and its number; empty where it says nothing."""
-    if len(line) > _LONGEST_LINE:
-        raise InputError("line", f"{len(line)} characters", f"at most {_LONGEST_LINE}")
-    text = "".join(_COMMENT.sub(" ", line).partition(";")[0].upper().split())
-    if text.startswith("%"):
-        return "%"
-    slashed = text.startswith("/")
-    text = _NUMBERED.sub("", text.lstrip("/"), count=1) if text[:1] in "/N" else text
-    if _LABEL.fullmatch(text):
-        return ""
-    if any(sign in text for sign in "#[]="):
-        raise InputError("block", text, "numbers: macros are not run")
-    known = _WORDS.match(text)
-    if known is None or known.end() != len(text):
-        rest = text[known.end() if known else 0 :]
-        allowed = "words of a letter and a number with a decimal point, comments in ( ) or behind ;"
-        raise InputError("block", rest, allowed)
-    if slashed and re.search(r"[GXYZIJKRF]", text):
-        raise InputError("block", f"/{text}", "moves that no switch of the control leaves out: take the / or the line away")
-    return "" if slashed else text
+def _blocks(text: str, where: str) -> Iterator[tuple[int, str]]:
+    """Number and words of each line that says something, up to the tape's end."""
+    begun = False
+    for number, line in enumerate(io.StringIO(text), start=1):
+        try:
+            if number > MOST_PLACES:
+                raise InputError("lines", f"more than {MOST_PLACES}", f"at most {MOST_PLACES}")
+            block = block_of(line)
+        except InputError as error:
+            raise error.at(f"{where} line {number}") from None
+        if block == "%":
+            if begun:
+                return
+        elif block:
+            begun = True
+            yield number, block
+
+
+class Kept(NamedTuple):
+    """Words of a program's line that move nothing.
+
+    Parameters
+    ----------
+    line : int
+    after : bool
+        Whether they act behind the line's move.
+    text : str
+    """
+
+    line: int
+    after: bool
+    text: str
+
+
+def kept_words(path: str | Path) -> tuple[list[Kept], list[int]]:
+    """Return what a program says beside its moves, and the lines that lead where nobody knows (G28, G30, G53).
+
+    Work coordinates, corrections of the tool's length, smoothing, dwells, tools, speeds, coolant, stops and further M words; with them
+    `write_gcode` writes a program of another path.
+
+    Parameters
+    ----------
+    path : path
+        Of a program that `read_gcode` reads.
+    """
+    kept, led, unit = [], [], 1.0
+    for number, block in _blocks(decoded(read_bytes(path, "program", LARGEST_PROGRAM), "program", str(path)), str(path)):
+        codes, told, words = words_of(block)
+        unit = {20.0: _INCH, 21.0: 1.0}.get(told.get("unit", 0.0), unit)
+        if told.get("single") in (28, 30, 53):
+            led.append(number)
+        said = [f"G{code:g}" for code in codes["G"] if KINDS[code] in ("told", "system") or code in (4, 80)]
+        # tolerances are lengths, further numbers are none
+        size = unit if 64 in codes["G"] or 61 in codes["G"] else 1.0
+        letters = "XPSF" if told.get("single") == 4 else "HDPQST"
+        numbers = [f"{letter}{_told(words[letter] * (size if letter in 'PQ' else 1.0))}" for letter in letters if letter in words]
+        machine = [code for code in codes["M"] if code not in _ENDS]
+        before, after = ([f"M{code:g}" for code in machine if (code in _BEHIND) == late] for late in (False, True))
+        if said or before or numbers:
+            kept.append(Kept(number, False, " ".join([*said, *before, *numbers])))
+        if after:
+            kept.append(Kept(number, True, " ".join(after)))
+        if set(_ENDS) & set(codes["M"]):
+            break
+    return kept, led
 
 
 class _Program:
@@ -162,7 +163,7 @@ class _Program:
 
     def run(self, block: str, number: int) -> bool:
         """Run a line; true where the program ends with it."""
-        codes, told, words = _words(block)
+        codes, told, words = words_of(block)
         self._set(told, codes, words)
         single = told.get("single")
         axes = {i: words[letter] * self.unit for i, letter in enumerate(_AXES) if letter in words}
@@ -177,7 +178,7 @@ class _Program:
             self._move(axes, offsets, words.get("R"), number)
         if 5 in codes["M"]:
             self.turning = False
-        return bool({2, 30} & set(codes["M"]))
+        return bool(set(_ENDS) & set(codes["M"]))
 
     def _set(self, told: Mapping[str, float], codes: Mapping[str, list[float]], words: Mapping[str, float]) -> None:
         if "unit" in told:
@@ -330,37 +331,7 @@ class _Program:
         )
 
 
-def _words(block: str) -> tuple[dict[str, list[float]], dict[str, float], dict[str, float]]:
-    """G and M codes of a line, the G codes by what they set, and its further words."""
-    codes: dict[str, list[float]] = {"G": [], "M": []}
-    for letter, value in _CODES.findall(block):
-        codes[letter].append(float(value))
-    told: dict[str, float] = {}
-    for code in codes["G"]:
-        kind = _KIND.get(code)
-        if kind is None:
-            known = ", ".join(f"G{each:g}" for each in sorted(_KIND))
-            raise InputError("block", f"G{code:g}", _REFUSED.get(code, f"one of {known}"))
-        if kind != "told" and told.setdefault(kind, code) != code:
-            raise InputError("block", f"G{told[kind]:g} and G{code:g}", "one of them in a line")
-    for code in codes["M"]:
-        if code in _SUBPROGRAMS:
-            raise InputError("block", f"M{code:g}", "a program without subprograms and jumps")
-    rest = _CODES.sub("", block)
-    found = parse_parameters(_BARE_POINT.sub("", rest))
-    if len(found) != sum(map(str.isalpha, rest)):
-        raise InputError("block", block, "each word once in a line")
-    for letter, value in found.items():
-        if letter not in _LETTERS:
-            raise InputError("block", f"{letter}{value}", f"words {', '.join(_LETTERS)}, G and M: other axes are not followed")
-        if not abs(float(value)) <= _LARGEST_NUMBER:
-            raise InputError(letter, value, f"at most {_LARGEST_NUMBER:g}")
-    if ("P" in found or "Q" in found) and not (codes["M"] or any(_KIND[code] == "told" or code == 4 for code in codes["G"])):
-        raise InputError("block", block, "P and Q beside G4, G64 or an M word: turns of helices and cycles are not run")
-    return codes, told, {letter: float(value) for letter, value in found.items()}
-
-
-def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4) -> None:
+def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4, kept: Sequence[Kept] = ()) -> None:
     """Write a path as a program in millimetres, absolute, feeds per minute; `read_gcode` gives it back, line numbers aside.
 
     Parameters
@@ -370,6 +341,8 @@ def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4) -> Non
         With the tool upright.
     decimals : int
         Of the places in millimetres.
+    kept : sequence of Kept
+        What else the program says whose lines the path has: tools and speeds are its own then.
 
     Raises
     ------
@@ -386,12 +359,15 @@ def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4) -> Non
             raise InputError(name, "one that ends on the way", "one for all moves behind the first that has it", where)
     places = np.round(1e3 * tool_path.places, decimals) + 0.0
     lines = ["%", "G21 G90 G94 G17"]
-    speed, feed, tool = math.nan, math.nan, 0
-    for place, f, s, t in zip(places.tolist(), feeds.tolist(), speeds.tolist(), tool_path.tool.tolist(), strict=True):
-        if t != tool:
+    speed, feed, tool, further = math.nan, math.nan, 0, list(kept)
+    table = zip(places.tolist(), feeds.tolist(), speeds.tolist(), tool_path.tool.tolist(), tool_path.line.tolist(), strict=True)
+    for place, f, s, t, line in table:
+        while further and (further[0].line, further[0].after) < (line, True):
+            lines.append(further.pop(0).text)
+        if t != tool and not kept:
             lines.append(f"T{t} M6")
             tool = t
-        if s != speed and not math.isnan(s):
+        if s != speed and not math.isnan(s) and not kept:
             lines.append(f"S{_told(s)} M3" if s else "M5")
             speed = s
         word = ""
@@ -399,7 +375,7 @@ def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4) -> Non
             word, feed = f" F{_told(f)}", f
         x, y, z = (f"{value:.{decimals}f}" for value in place)
         lines.append(f"{'G0' if f == math.inf else 'G1'} X{x} Y{y} Z{z}{word}")
-    write_text(path, "\n".join([*lines, "M30", "%"]) + "\n")
+    write_text(path, "\n".join([*lines, *(each.text for each in further), "M30", "%"]) + "\n")
 
 
 def _told(value: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_speed_csv
 from rcsa_ident.io.files import write_text
-from rcsa_ident.io.gcode import read_gcode, write_gcode
+from rcsa_ident.io.gcode import Kept, read_gcode, write_gcode
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
@@ -100,7 +100,7 @@ def check_path_name(path: str | Path) -> None:
         raise InputError("output file", Path(path).name, _ALLOWED)
 
 
-def write_tool_path(path: str | Path, tool_path: ToolPath, decimals: int = 4) -> None:
+def write_tool_path(path: str | Path, tool_path: ToolPath, decimals: int = 4, kept: Sequence[Kept] = ()) -> None:
     """Write a path in the form that the file's name says; `read_tool_path` gives it back, line numbers aside.
 
     Parameters
@@ -109,10 +109,12 @@ def write_tool_path(path: str | Path, tool_path: ToolPath, decimals: int = 4) ->
     tool_path : ToolPath
     decimals : int
         Of the places in millimetres; those of a program only, a table has them to a picometre.
+    kept : sequence of Kept
+        What else a program says, of which a table has nothing.
     """
     check_path_name(path)
     if Path(path).suffix.lower() in PROGRAMS:
-        write_gcode(path, tool_path, decimals)
+        write_gcode(path, tool_path, decimals, kept)
         return
     # metres and back leave a last digit that nobody asked for
     columns = dict(zip(PLACE, (1e3 * tool_path.places).round(9).T, strict=True))

@@ -8,19 +8,71 @@ of the commanded path shows is taken off it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import TypeVar
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.toolpath.deviation import Deviation
+from rcsa_ident.toolpath.path import ToolPath
 
-Place = TypeVar("Place")
+#: Largest correction of a place [m]: one that is asked for more is not understood.
+LARGEST = 2e-3
+Sent = TypeVar("Sent")
+
+
+class Place(StrEnum):
+    """What became of a place that was to be corrected."""
+
+    CORRECTED = "corrected"
+    RAPID = "not corrected: a rapid move"
+    SATURATED = "saturated: corrected by the largest that is allowed"
+    JOINT_RANGE = "not corrected: the corrected place is beyond the joints' range"
+    OUT_OF_REACH = "not corrected: the corrected place is out of the arm's reach"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompensatedPath:
+    """A path to command, and what it leaves.
+
+    Parameters
+    ----------
+    path : ToolPath
+    correction : array, shape (k, 3) [m]
+    became : tuple of Place
+        Of each place.
+    controller, before, after : Deviation
+        Of drives that give way to nothing; of the path as it was and of the commanded one, on the machine that compensates.
+    draws : tuple of Deviation
+        Of the commanded path on other machines that what is known allows.
+    postures : array, shape (k, j) [rad], or None
+        Of an arm's drives along it.
+    loose : array, shape (k,) [m], or None
+        How far an arm's tool may be to either side within the play of drives that no torque holds on one.
+    """
+
+    path: ToolPath
+    correction: FloatArray
+    became: tuple[Place, ...]
+    controller: Deviation
+    before: Deviation
+    after: Deviation
+    draws: tuple[Deviation, ...] = ()
+    postures: FloatArray | None = None
+    loose: FloatArray | None = None
+
+    @property
+    def limited(self) -> tuple[int, ...]:
+        """Places, from 0, that are corrected by less than asked for, or not at all."""
+        return tuple(k for k, each in enumerate(self.became) if each not in (Place.CORRECTED, Place.RAPID))
 
 
 def ahead_of_force(
-    angles: FloatArray, torques: FloatArray, twist: Callable[[FloatArray], FloatArray], place: Callable[[FloatArray], Place]
-) -> Sequence[Place]:
+    angles: FloatArray, torques: FloatArray, twist: Callable[[FloatArray], FloatArray], place: Callable[[FloatArray], Sent]
+) -> Sequence[Sent]:
     """Return the places to command along a path, q + K^-1 tau, play to the torque's side.
 
     Parameters
@@ -70,3 +122,16 @@ def mirrored(places: FloatArray, reached: Callable[[FloatArray], FloatArray], pa
     for _ in range(passes):
         commanded = commanded - (reached(commanded) - places)
     return commanded
+
+
+def limited(correction: FloatArray, largest: float) -> tuple[FloatArray, np.ndarray]:
+    """Return corrections, shape (k, 3) [m], none longer than the largest [m], and which ones were.
+
+    Examples
+    --------
+    >>> limited(np.array([[3e-3, 0.0, 4e-3], [1e-3, 0.0, 0.0]]), 2.5e-3)[0].tolist()
+    [[0.0015, 0.0, 0.002], [0.001, 0.0, 0.0]]
+    """
+    size = np.linalg.norm(correction, axis=1, keepdims=True)
+    longer = size > positive("largest correction", largest, "m")
+    return np.where(longer, correction * (largest / np.where(longer, size, 1.0)), correction), longer[:, 0]

@@ -110,12 +110,14 @@ class ToolPath:
         taken = np.divide(lengths, feed, out=np.zeros_like(lengths), where=lengths > _NOWHERE)
         return np.concatenate([[0.0], np.cumsum(taken)])
 
-    def resampled(self, step: float) -> ToolPath:
+    def resampled(self, step: float, rapid: bool = True) -> ToolPath:
         """Return the same path with places nowhere further apart than a step [m]; all places of this one stay.
 
-        Between them a tool's axis turns evenly with the way.
+        Between them a tool's axis turns evenly with the way. Rapid moves stay whole where `rapid` is false.
         """
         pieces = np.maximum(np.ceil(self.lengths / positive("step", step, "m") - 1e-9).astype(int), 1)
+        if not rapid:
+            pieces[~self.cutting] = 1
         # the move that each new place belongs to, and how far along it stands
         move = np.repeat(np.arange(pieces.size), pieces)
         share = (np.arange(move.size) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1.0) / pieces[move]

@@ -98,22 +98,26 @@ def following(robot: RobotModel, start: FloatArray, tips: FloatArray, axes: Floa
     InputError
         If a place is out of reach, or within reach of no allowed posture; it says which place.
     """
-    length = assembly.stickout + assembly.holder_length
     here, sideways, found = robot.posture(start), tool_point_at(robot, start).turn[:, 0], []
     for number, (tip, axis) in enumerate(zip(tips, axes, strict=True), start=1):
-        x = sideways - axis * (axis @ sideways)
-        if np.linalg.norm(x) < _ALONG:
+        if abs(axis @ sideways) > np.sqrt(1.0 - _ALONG**2):
             raise InputError(f"tool's axis at place {number}", axis.tolist(), "one across the x of the tool at the posture to begin from")
-        x = x / np.linalg.norm(x)
-        turn = np.stack([x, np.cross(-axis, x), -axis], axis=1)
-        flange = Frame(turn, tip + length * axis).then(robot.tool_point.inverse)
-        ways = postures_of(robot, flange, near=here)
+        ways = postures_of(robot, flange_for(robot, sideways, tip, axis, assembly), near=here)
         if not len(ways):
             told = ", ".join(f"{1e3 * v:.0f}" for v in tip)
             raise InputError(f"place {number} of the path", f"{told} mm", "one that the robot reaches within its limits")
         here = ways[np.argmin(np.max(np.abs(ways - here), axis=1))]
         found.append(here)
     return np.array(found)
+
+
+def flange_for(robot: RobotModel, sideways: FloatArray, tip: FloatArray, axis: FloatArray, assembly: ToolAssembly) -> Frame:
+    """Return where the flange must be for a tool's tip [m] and axis, shape (3,), the tool's x along `sideways` as nearly as may be."""
+    x = sideways - axis * (axis @ sideways)
+    x = x / np.linalg.norm(x)
+    turn = np.stack([x, np.cross(-axis, x), -axis], axis=1)
+    length = assembly.stickout + assembly.holder_length
+    return Frame(turn, tip + length * axis).then(robot.tool_point.inverse)
 
 
 def limits_along(

@@ -122,6 +122,12 @@ def test_map_along_a_path(tmp_path):
     ]
     everywhere = min(float(r["limit_depth_mm"]) for r in rows if float(r["spindle_speed_rpm"]) == told["best_speed_rpm"])
     assert told["limit_everywhere_mm"] == pytest.approx(everywhere)
+    # the same places from a program
+    program = tmp_path / "PATH.nc"
+    program.write_text("G21 G90 G0 X900 Y0 Z300\nG1 X950 F3000\nX1100 Y100\n")
+    again = run("robot", "map", TX200, TOOL, "--posture", NEAR, "--path", program, *MATERIAL, *speeds, "--out", out, "--json")
+    assert again.exit_code == 0, again.output
+    assert rows_of(out) == rows
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import gcode
-from rcsa_ident.io.gcode import gcode_of, read_gcode, write_gcode
+from rcsa_ident.io.gcode import Kept, gcode_of, kept_words, read_gcode, write_gcode
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from rcsa_ident.units import to_rpm
 from tests.fixtures.paths import ROOT
@@ -318,3 +318,42 @@ def test_finer_places_where_wanted(tmp_path):
     for decimals, away in ((4, 1e-7), (7, 1e-10)):
         write_gcode(tmp_path / "P.nc", path, decimals)
         assert abs(read_gcode(tmp_path / "P.nc").places[1, 0] - path.places[1, 0]) < away
+
+
+def test_what_moves_nothing_is_kept_at_its_place(tmp_path):
+    """Of a pocket: the same path, and around it what the machine needs."""
+    kept, led = kept_words(POCKET)
+    assert led == [6, 45, 47]
+    path = read_gcode(POCKET)
+    write_gcode(tmp_path / "P.nc", path, 6, kept)
+    again = read_gcode(tmp_path / "P.nc")
+    same(again, path.through(path.places.round(9)))
+    lines = (tmp_path / "P.nc").read_text().splitlines()
+    order = [lines.index(each) for each in ("M6 T2", "M3 S8000", "G54", "M8", "G43 H2", "M9", "M5", "M30")]
+    assert order == sorted(order)
+    assert lines[order[4] + 1].startswith("G0 X20.000000 Y20.000000 Z15")
+    assert lines[order[5] - 1].startswith("G0")
+
+
+def test_lengths_among_kept_words_change_their_unit(tmp_path):
+    file = tmp_path / "P.nc"
+    file.write_text("G20 G64 P0.001 (inch)\nG0 X0 Y0 Z0 M8\nG4 P1.5\nG1 X1 F10 M9\nM1\nG1 X2 M30\nM7\n")
+    assert kept_words(file)[0] == [
+        Kept(1, False, "G64 P0.0254"),
+        Kept(2, False, "M8"),
+        Kept(3, False, "G4 P1.5"),
+        Kept(4, True, "M9"),
+        Kept(5, True, "M1"),
+    ]
+
+
+@given(st.lists(st.text(alphabet="GXYZIJKRFSTMNHPOA0123456789.-+ ()/;%,#\t", max_size=24), max_size=8))
+def test_whatever_is_read_is_a_path_or_an_error_that_names_its_line(lines):
+    where = "P.nc"
+    try:
+        path = gcode_of("\n".join(lines), where)
+    except InputError as error:
+        where = error.where
+    else:
+        assert np.isfinite(path.places).all()
+    assert where.startswith("P.nc")

@@ -96,6 +96,13 @@ class RobotPosterior:
         """The arm with its most probable springs."""
         return self.best.arm(self.sheet, self.tilts)
 
+    def draws(self, count: int, rng: np.random.Generator) -> tuple[FlexibleRobot, ...]:
+        """Return arms that the cuts allow, each as probable as the posterior has it; those of the rivals are not among them."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        thetas = self.best.theta + rng.normal(size=(count, values.size)) @ root.T
+        return tuple(replace(self.best, theta=theta).arm(self.sheet, self.tilts) for theta in thetas)
+
     def at(self, posture: FloatArray, turn: float = 0.0, unknowns: RobotUnknowns | None = None) -> PosedRobot:
         """Return the robot at a posture [rad], its feed turned from the tool's x [rad]; of other unknowns than the best ones if told."""
         chosen = self.best if unknowns is None else unknowns

@@ -220,3 +220,67 @@ def point_torques(turn, offset, axis, angles, rate, acceleration, gravity, link,
             mass[link[p]] = 0.0
             for k in range(n):
                 out[p, k, t] = torque[k]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def march(chain, play, gravity, point, fed, force, held, rate, step, out):
+    """March an arm through time by the average acceleration [newmark1959]; return the instants done, fewer where one has no solution.
+
+    M(q) q'' + c(q, q') + g(q) = J^T F + fed - k (q - held, less the play) - d (q' - rate), solved at each instant by Newton's steps with
+    the tangent of inertia, damping and springs.
+
+    Parameters
+    ----------
+    chain : its arrays by name; play : (n,) half of each
+    gravity : (3,); point : (3,) of the tool's tip in the last frame
+    fed : (t, n) torques of the control; force : (t, 3) on the tip, in the base's axes
+    held, rate : (t, n) angles that the drives hold, and their rates
+    step : of time
+    out : (t, n) angles; the first row is given, at rest
+    """
+    n = play.size
+    rotation, origin, direction = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 3))
+    tangent, torque, gap, tip = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(3)
+    angle, speed, gain = out[0].copy(), np.zeros(n), np.zeros(n)
+    last, last_speed, last_gain = np.empty(n), np.empty(n), np.empty(n)
+    inertial, viscous = 4.0 / (step * step), 2.0 / step
+    for t in range(1, out.shape[0]):
+        for i in range(n):
+            last[i], last_speed[i], last_gain[i] = angle[i], speed[i], gain[i]
+            angle[i] += step * speed[i] + 0.5 * step * step * gain[i]
+        settled = False
+        for _ in range(40):
+            for i in range(n):
+                gain[i] = inertial * (angle[i] - last[i] - step * last_speed[i]) - last_gain[i]
+                speed[i] = last_speed[i] + 0.5 * step * (last_gain[i] + gain[i])
+            if settled:
+                break
+            frames(chain.turn, chain.offset, chain.axis, angle, rotation, origin, direction)
+            mass_matrix(rotation, origin, direction, chain.mass, chain.centre, chain.inertia, tangent)
+            inverse_dynamics(rotation, origin, direction, chain.mass, chain.centre, chain.inertia, speed, gain, gravity, torque)
+            for i in range(3):
+                tip[i] = origin[n - 1, i]
+                for j in range(3):
+                    tip[i] += rotation[n - 1, i, j] * point[j]
+            fx, fy, fz = force[t]
+            for k in range(n):
+                x, y, z = tip[0] - origin[k, 0], tip[1] - origin[k, 1], tip[2] - origin[k, 2]
+                own = direction[k, 0] * (y * fz - z * fy) + direction[k, 1] * (z * fx - x * fz) + direction[k, 2] * (x * fy - y * fx)
+                twist = angle[k] - held[t, k]
+                felt = max(abs(twist) - play[k], 0.0) * (1.0 if twist > 0.0 else -1.0)
+                springs = chain.stiffness[k] * felt + chain.damping[k] * (speed[k] - rate[t, k])
+                gap[k] = own + fed[t, k] - springs - torque[k]
+                for j in range(n):
+                    tangent[k, j] *= inertial
+                tangent[k, k] += viscous * chain.damping[k] + (chain.stiffness[k] if felt != 0.0 else 0.0)
+            solve_symmetric(tangent, gap)
+            settled = True
+            for k in range(n):
+                angle[k] += gap[k]
+                # what is no number has not settled
+                settled = settled and abs(gap[k]) < 1e-12
+        if not settled:
+            return t
+        for k in range(n):
+            out[t, k] = angle[k]
+    return out.shape[0]

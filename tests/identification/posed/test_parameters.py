@@ -6,7 +6,7 @@ import pytest
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.posed.likely_spindles import drawn, spindle_of
 from rcsa_ident.identification.posed.parameters import PosedLayout, chain, pack, share_of, stiffening, unknown_of, unpack
-from rcsa_ident.identification.posed.posterior import RobotUnknowns
+from rcsa_ident.identification.posed.posterior import RobotPosterior, RobotUnknowns
 from rcsa_ident.identification.posed.priors import arm_priors, posed_prior_rows
 from tests.fixtures.robots import robot
 
@@ -71,3 +71,22 @@ def test_drawn_spindles_swing_no_more_than_they_weigh():
 def test_a_vector_of_another_size_is_refused():
     with pytest.raises(InputError, match="unknowns"):
         RobotUnknowns(vector()[:-1], LAYOUT)
+
+
+def test_draws_scatter_as_the_covariance_has_it():
+    model = robot("kr210")
+    springs = tuple(model.chain().stiffness.tolist())
+    layout = PosedLayout(springs, len(model.joints))
+    centre = posed_prior_rows(layout, arm_priors(model)).centre
+    sizes = np.zeros(layout.size)
+    sizes[layout.compliances], sizes[layout.weights] = 0.05, 0.02
+    posterior = RobotPosterior(model, True, RobotUnknowns(centre, layout), np.diag(sizes**2), np.ones(layout.size))
+    arms = posterior.draws(400, np.random.default_rng(3))
+    compliance = np.array([springs / each.model.chain().stiffness for each in arms])
+    # an unknown of one is a compliance of about one, which it moves by nearly as much
+    np.testing.assert_allclose(compliance.mean(axis=0), 1.0, atol=0.01)
+    np.testing.assert_allclose(compliance.std(axis=0), 0.05, rtol=0.15)
+    masses = np.log([each.model.joints[2].body.mass / model.joints[2].body.mass for each in arms])
+    assert masses.std() == pytest.approx(0.02, rel=0.15)
+    again = posterior.draws(2, np.random.default_rng(3))
+    np.testing.assert_array_equal(again[1].model.chain().stiffness, arms[1].model.chain().stiffness)

@@ -140,3 +140,74 @@ def test_points_of_unit_mass_weigh_as_bodies_do():
     for t in range(4):
         expected = torques(posed(light, angles[t]), rate[t], acceleration[t], GRAVITY)
         np.testing.assert_allclose(weight @ out[:, :, t], expected, rtol=1e-10, atol=1e-10 * np.abs(expected).max())
+
+
+def marched(model, step, seconds, tilts=False):
+    """An arm whose first drive is turned on, evenly faster, while a force on its tip rises."""
+    chain = model.chain(tilts)
+    t = np.arange(0.0, seconds + 0.5 * step, step)
+    start, n = chain.angles(np.radians([0.0, 20.0, 30.0, 10.0, -40.0, 0.0])), chain.mass.size
+    held, rate = np.tile(start, (t.size, 1)), np.zeros((t.size, n))
+    held[:, 0] += 0.5 * t**2
+    rate[:, 0] = t
+    force = np.stack([200.0 * t, -1000.0 * t, 500.0 * t], axis=1)
+    play = np.zeros(n)
+    play[chain.driven] = [j.backlash for j in model.joints]
+    point, out = np.array([0.1, 0.05, -0.3]), np.empty((t.size, n))
+    out[0] = start
+    done = kernels.march(chain, play, np.zeros(3), point, np.zeros((t.size, n)), force, held, rate, step, out)
+    assert done == t.size
+    return t, out, play, point, start
+
+
+def test_a_march_converges_to_the_equations_of_motion():
+    """Beside Runge and Kutta's method on the arm's accelerations, play and all; the step's square is what is left."""
+    model = robot("kr210")
+    light = replace(model, joints=tuple(replace(j, tilts=()) for j in model.joints))
+    seconds = 0.02
+    coarse, fine = (marched(light, step, seconds)[1][-1] for step in (1e-3, 5e-4))
+    _, _, play, point, start = marched(light, 1e-3, seconds)
+
+    def slope(t, state):
+        angles, speed = state[:6], state[6:]
+        chain = posed(light, angles)
+        held = start + np.eye(6)[0] * 0.5 * t**2
+        twist = angles - held
+        torque = -chain.chain.stiffness * np.sign(twist) * np.maximum(np.abs(twist) - play, 0.0)
+        torque = torque - chain.chain.damping * (speed - np.eye(6)[0] * t)
+        tip = chain.origin[-1] + chain.rotation[-1] @ point
+        torque = torque + chain.jacobian(tip)[:3].T @ np.array([200.0 * t, -1000.0 * t, 500.0 * t])
+        return np.concatenate([speed, accelerations(chain, speed, torque, np.zeros(3))])
+
+    state, step = np.concatenate([start, np.zeros(6)]), 2e-5
+    for k in range(round(seconds / step)):
+        t = k * step
+        a = slope(t, state)
+        b = slope(t + 0.5 * step, state + 0.5 * step * a)
+        c = slope(t + 0.5 * step, state + 0.5 * step * b)
+        d = slope(t + step, state + step * c)
+        state = state + step / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+    moved = np.abs(state[:6] - start).max()
+    off, finer = (np.abs(each - state[:6]).max() for each in (coarse, fine))
+    assert off < 2e-3 * moved
+    assert finer < 0.4 * off
+
+
+def test_a_march_at_rest_stays_there():
+    model = robot("kr210")
+    n = model.freedoms()
+    start = model.chain().angles(np.radians([0.0, 20.0, 30.0, 10.0, -40.0, 0.0]))
+    held, still, out = np.tile(start, (20, 1)), np.zeros((20, n)), np.empty((20, n))
+    out[0] = start
+    done = kernels.march(model.chain(), np.zeros(n), np.zeros(3), np.zeros(3), still, np.zeros((20, 3)), held, still, 1e-3, out)
+    assert done == 20
+    np.testing.assert_array_equal(out, held)
+
+
+def test_a_march_that_finds_nothing_says_where():
+    model = robot("kr210")
+    n = model.freedoms()
+    held, still, out = np.zeros((5, n)), np.zeros((5, n)), np.zeros((5, n))
+    force = np.zeros((5, 3))
+    force[3] = np.nan
+    assert kernels.march(model.chain(), np.zeros(n), np.zeros(3), np.zeros(3), still, force, held, still, 1e-3, out) == 3
