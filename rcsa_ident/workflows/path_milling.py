@@ -26,7 +26,10 @@ from rcsa_ident.workflows.robot_milling import arm_carrier
 from rcsa_ident.workflows.tool_change import ToolChange
 
 #: Share of its swing by which a tip that chatters stands elsewhere after a turn, what counts as standing still [m], and turns that tell.
-_ELSEWHERE, _STILL, _FEWEST = 0.2, 5e-7, 6
+#: Below the limit it comes back to a tenth of that (tests/workflows/test_path_milling.py).
+_ELSEWHERE, _STILL, _FEWEST = 0.05, 1e-7, 9
+#: What falls further from one half of a move to the other dies out.
+_DYING = 0.8
 #: Between places of walls that are told [m].
 _SURFACE = 2e-5
 _ROWS = ("time", "places", "mean_force", "peak_force", "mean_tip", "once", "swing")
@@ -53,7 +56,8 @@ class PathMilling:
     swing : array, shape (n,) [m]
         From end to end of its way in a turn, across the axis.
     beside_turns : array, shape (n,) [m]
-        By which the tip stands elsewhere than a turn before.
+        By which the tip stands elsewhere than a turn before, as seen from its mean place in each turn: what is slow beside
+        the tool's turns, as an arm's sway, hardly counts.
     surface : array, shape (m, 6)
         Of the walls: place (3) and height above the tip [m], error [m], positive where material is left, and move.
     roughness : Roughness or None
@@ -79,14 +83,20 @@ class PathMilling:
 
     @property
     def chattering(self) -> tuple[int, ...]:
-        """Moves whose tip does not come back to where it was a turn before, as a rule by more than `_ELSEWHERE` of its swing."""
+        """Moves whose tip does not come back to where it was a turn before, and does so no better from their first half to the second.
+
+        Their beginning and end, where the tool comes and goes, are left aside.
+        """
         found = []
         for move in np.unique(self.move):
-            own = self.move == move
-            if np.count_nonzero(own) >= _FEWEST:
-                beside = float(np.median(self.beside_turns[own]))
-                if beside > max(_ELSEWHERE * float(np.median(self.swing[own])), _STILL):
-                    found.append(int(move))
+            own = np.flatnonzero((self.move == move) & (self.peak_force > 0.0))
+            inner = own[own.size // 5 : own.size - own.size // 5]
+            if inner.size < _FEWEST:
+                continue
+            early, late = (float(np.median(self.beside_turns[half])) for half in np.array_split(inner, 2))
+            swing = float(np.median(self.swing[inner]))
+            if late > max(_ELSEWHERE * swing, _STILL) and late > _DYING * early:
+                found.append(int(move))
         return tuple(found)
 
     @property
@@ -126,7 +136,8 @@ class PathMilling:
         ]
         lines = sorted({int(path.line[move + 1]) for move in self.chattering})
         if lines:
-            where = f"on {len(self.chattering)} moves" + (f", lines {', '.join(map(str, lines[:8]))}" if any(lines) else "")
+            count = len(self.chattering)
+            where = f"on {count} move{'s' if count > 1 else ''}" + (f", lines {', '.join(map(str, lines[:8]))}" if any(lines) else "")
             told.append(f"it chatters {where}{' and others' if len(lines) > 8 else ''}")
         else:
             told.append("no move chatters")
@@ -187,7 +198,7 @@ def mill_path(
         parts.append(part)
         for side, x, error in part.surfaces():
             surfaces.append(_surface_rows(part, side, x, error))
-            if x[-1] - x[0] > 2.5 * cutoff:
+            if x[-1] - x[0] > 2.5 * cutoff and x.size == round((x[-1] - x[0]) / part.walls.spacing) + 1:
                 found = roughness(error[len(error) // 2], part.walls.spacing, cutoff)
                 worst = found if worst is None or found.mean > worst.mean else worst
         # walls take far more memory than what is told of a turn
@@ -196,13 +207,15 @@ def mill_path(
             progress(int(1e4 * done[part.move + 1]), int(1e4 * done[-1]))
     rows = [np.concatenate([getattr(part, name) for part in parts]) if parts else np.zeros((0, 3)) for name in _ROWS]
     time, places, mean_force, peak_force, mean_tip, once, swing = rows
+    time = time.ravel()
     move = np.repeat([part.move for part in parts], [part.time.size for part in parts]) if parts else np.zeros(0, dtype=int)
-    beside = np.linalg.norm(np.diff(once, axis=0, prepend=once[:1]), axis=1)
-    # a tool that has been at rest since stands elsewhere for another reason
-    beside[np.diff(time, prepend=time[:1]).ravel() > 1.5 * np.median(np.diff(time)) if time.size > 1 else slice(0)] = 0.0
+    seen = once[:, :2] - mean_tip[:, :2]
+    beside = np.linalg.norm(np.diff(seen, axis=0, prepend=seen[:1]), axis=1)
+    # at corners and after a rest it stands elsewhere for another reason
+    beside[np.flatnonzero(np.diff(move)) + 1] = 0.0
     return PathMilling(
         move,
-        time.ravel(),
+        time,
         places,
         mean_force,
         peak_force.ravel(),
