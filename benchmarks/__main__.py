@@ -30,6 +30,7 @@ CLAIMS = (
     "bad_input",
     "robot",
     "urdf",
+    "removal",
 )
 #: Each is a module with ``main(arguments)``.
 STUDIES = (

@@ -146,26 +146,40 @@ def capsule_on_line(a0, o0, a1, o1, radius, o):
 
 
 @numba.njit(cache=True)
-def _cut_across(seg, count, along, lattice, move, outline, told):
-    """Shorten the lines along x or y by an upright tool on a level or a vertical move; return whether all had room."""
+def _cut_across(seg, count, along, lattice, move, outline, been, told):
+    """Shorten the lines along x or y by an upright tool on a level or a vertical move; return whether all had room.
+
+    `been` says that the tool has cut where the move begins: lines that it meets no farther than there are left alone.
+    """
     other = 1 - along
     origin, cell = lattice[0], lattice[1]
     bottom, top = min(move[0, 2], move[1, 2]), max(move[0, 2], move[1, 2])
     first = max(math.ceil((bottom - origin[2]) / cell[2]), 0)
     last = min(math.floor((top + outline[0, -1] - origin[2]) / cell[2]), seg.shape[0] - 1)
     left, right = min(move[0, other], move[1, other]), max(move[0, other], move[1, other])
+    low, high = np.empty(seg.shape[1]), np.empty(seg.shape[1])
+    begin, end, known = 0, -1, -1.0
     for k in range(first, last + 1):
         z = origin[2] + k * cell[2]
         radius = widest_between(outline, z - top, z - bottom)
         if radius <= 0.0:
             continue
-        begin = max(math.ceil((left - radius - origin[other]) / cell[other]), 0)
-        end = min(math.floor((right + radius - origin[other]) / cell[other]), seg.shape[1] - 1)
+        if radius != known:
+            # a cylinder is the same in all planes
+            known = radius
+            begin = max(math.ceil((left - radius - origin[other]) / cell[other]), 0)
+            end = min(math.floor((right + radius - origin[other]) / cell[other]), seg.shape[1] - 1)
+            for n in range(begin, end + 1):
+                o = origin[other] + n * cell[other]
+                low[n], high[n] = capsule_on_line(move[0, along], move[0, other], move[1, along], move[1, other], radius, o)
+                if been:
+                    half = radius * radius - (o - move[0, other]) ** 2
+                    half = math.sqrt(half) if half > 0.0 else -1.0
+                    if half > 0.0 and move[0, along] - half <= low[n] and move[0, along] + half >= high[n]:
+                        high[n] = -np.inf
         for n in range(begin, end + 1):
-            o = origin[other] + n * cell[other]
-            low, high = capsule_on_line(move[0, along], move[0, other], move[1, along], move[1, other], radius, o)
-            if high > low:
-                taken = cut(seg, count, k, n, low, high)
+            if high[n] > low[n]:
+                taken = cut(seg, count, k, n, low[n], high[n])
                 if taken < 0.0:
                     return False
                 told[along] += taken
@@ -362,9 +376,9 @@ def sweep_upright(segs, counts, lattice, places, moves, outline, peak, been, tol
         move = places[i : i + 2]
         level = move[0, 2] == move[1, 2]
         if level or (move[0, 0] == move[1, 0] and move[0, 1] == move[1, 1]):
-            if not _cut_across(segs[0], counts[0], 0, lattice, move, outline, told[i]):
+            if not _cut_across(segs[0], counts[0], 0, lattice, move, outline, been and level, told[i]):
                 return i
-            if not _cut_across(segs[1], counts[1], 1, lattice, move, outline, told[i]):
+            if not _cut_across(segs[1], counts[1], 1, lattice, move, outline, been and level, told[i]):
                 return i
             if not _cut_down(segs[2], counts[2], lattice, move, outline, peak, been and level, told[i]):
                 return i

@@ -216,13 +216,24 @@ def surface_net(segs, counts, lattice, every, filled, vertices, faces):
 
 
 @numba.njit(cache=True)
-def _nearest_end(seg, count, m, n, which, place):
-    """Distance from a place to the nearest end of this sense on a line that may lie outside."""
+def _to_nearest_end(seg, count, m, n, which, place):
+    """Way from a place to the nearest end of this sense on a line; infinite where the line is not there or has none."""
     found = np.inf
     if 0 <= m < seg.shape[0] and 0 <= n < seg.shape[1]:
         for k in range(count[m, n]):
-            found = min(found, abs(seg[m, n, k, which] - place))
+            way = seg[m, n, k, which] - place
+            if abs(way) < abs(found):
+                found = way
     return found
+
+
+@numba.njit(cache=True)
+def _slope(before, behind, cell):
+    """Slope of a surface by the ways to it on both sides: their mean where it is smooth, the smaller one where it has an edge."""
+    least, most = min(abs(before), abs(behind)), max(abs(before), abs(behind))
+    if most - least <= 0.5 * cell:
+        return 0.5 * abs(behind - before) / cell
+    return least / cell
 
 
 @numba.njit(cache=True)
@@ -243,7 +254,12 @@ def nodes_and_rest(seg, count, origin, cell, cell_one, cell_two):
                 for which in range(2):
                     beyond = (high - last if which == 1 else first - low) - 0.5
                     place = seg[m, n, k, which]
-                    one = min(_nearest_end(seg, count, m - 1, n, which, place), _nearest_end(seg, count, m + 1, n, which, place)) / cell_one
-                    two = min(_nearest_end(seg, count, m, n - 1, which, place), _nearest_end(seg, count, m, n + 1, which, place)) / cell_two
+                    ways = (
+                        _to_nearest_end(seg, count, m - 1, n, which, place),
+                        _to_nearest_end(seg, count, m + 1, n, which, place),
+                        _to_nearest_end(seg, count, m, n - 1, which, place),
+                        _to_nearest_end(seg, count, m, n + 1, which, place),
+                    )
+                    one, two = _slope(ways[0], ways[1], cell_one), _slope(ways[2], ways[3], cell_two)
                     rest += beyond / (1.0 + one * one + two * two)
     return nodes, rest

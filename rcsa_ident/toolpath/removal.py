@@ -20,7 +20,7 @@ from rcsa_ident.toolpath.solid import ToolSolid
 #: Sine of the angle by which a tool stands upright.
 _UPRIGHT = 1e-9
 #: By which ridges between substeps may stand, by default, as a share of the distance between lines.
-TOLERANCE = 0.02
+TOLERANCE = 0.01
 _AXES = tuple(np.array(axes) for axes in GRIDS)
 
 
@@ -37,7 +37,7 @@ class Sweep(Shown):
         Cut in place.
     solid : ToolSolid
     path : ToolPath
-    tolerance : float [m], default a fiftieth of the distance between lines
+    tolerance : float [m], default a hundredth of the distance between lines
         By which the cut surface may stand off the exact one.
 
     Examples

@@ -150,7 +150,10 @@ def remove_along(
 
 def _misplaced(solid: ToolSolid, path: ToolPath, low: FloatArray, high: FloatArray) -> list[str]:
     """What is odd about where path and stock lie, and how large the tool is beside the stock."""
-    first, last = path.places.min(axis=0) - solid.radius, path.places.max(axis=0) + solid.radius
+    upright = np.all(path.axes[:, 2] > 1.0 - 1e-12)
+    # what the tool reaches around its tips
+    aside = np.full(3, solid.radius if upright else np.hypot(solid.radius, solid.length))
+    first, last = path.places.min(axis=0) - aside * [1.0, 1.0, not upright], path.places.max(axis=0) + aside
     last[2] += solid.length
     gap = float(np.linalg.norm(np.maximum(np.maximum(low - last, first - high), 0.0)))
     size = float(np.linalg.norm(high - low))
