@@ -51,6 +51,9 @@ _OPTIONS = {
     "channel": ("channel", ""),
     "sampling_rate_hz": ("rate_hz", ""),
     "mass": ("mass_g", ""),
+    "cell": ("cell_mm", ""),
+    "step": ("step_mm", ""),
+    "stock": ("stock", ""),
 }
 
 Command = TypeVar("Command", bound=Callable[..., Any])

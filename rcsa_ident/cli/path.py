@@ -92,8 +92,8 @@ def remove(
         )
         return
     say(f"{1e9 * found.removed:.6g} mm³ are taken out of {1e9 * (found.removed + found.part.volume):.6g} mm³ on {len(found.path)} places")
-    rate = 1e-6 * found.updates / max(found.seconds, 1e-9)
-    say(f"lines every {1e3 * float(found.part.cell.max()):.3g} mm, {found.part.memory / 1e6:.3g} MB, {rate:.3g} million updates a second")
+    held = f"{found.part.memory / 1e6:.3g} MB"
+    say(f"lines every {1e3 * float(found.part.cell.max()):.3g} mm, {held}, met {found.updates} times")
     for warning in found.warnings:
         warn(warning)
     for written in (out, part, plot):

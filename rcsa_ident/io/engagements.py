@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import read_table
-from rcsa_ident.toolpath.engagement import PathEngagement
-from rcsa_ident.toolpath.path import ToolPath
+
+if TYPE_CHECKING:
+    from rcsa_ident.toolpath.engagement import PathEngagement
+    from rcsa_ident.toolpath.path import ToolPath
 
 COLUMNS = ("z_mm", "entry_angle_deg", "exit_angle_deg")
 ALONG = ("x_mm", "y_mm", "z_mm", "slice_mm", "entry_angle_deg", "exit_angle_deg", "removed_volume_mm3")

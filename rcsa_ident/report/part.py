@@ -31,7 +31,7 @@ def part_figure(field: DexelField, path: ToolPath | None = None) -> Figure:
     ----------
     field : DexelField
     path : ToolPath or None
-        Drawn from above: cutting moves as lines, rapid ones dashed.
+        Drawn from above.
     """
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(11.0, 4.8), layout="constrained")
@@ -169,9 +169,20 @@ def _rendered(
                 nearer = near > depth[rows, columns]
                 depth[rows[nearer], columns[nearer]] = near[nearer]
                 value[rows[nearer], columns[nearer]] = lit[nearer]
+    # a line where the surface turns, or where something nearer hides what is behind: surfaces of one slope are equally bright
+    value[1:, :] *= np.where(_jumps(depth, value, size, 0), 0.5, 1.0)
+    value[:, 1:] *= np.where(_jumps(depth, value, size, 1), 0.5, 1.0)
     image = np.zeros((*shape, 4))
     image[..., :3], image[..., 3] = np.clip(1.25 * value, 0.0, 1.0), np.isfinite(depth)
     return image
+
+
+def _jumps(depth: FloatArray, value: FloatArray, size: float, along: int) -> np.ndarray:
+    """Between which neighbours of an image there is an edge."""
+    seen = np.isfinite(depth)
+    filled = np.where(seen, depth, 0.0)
+    both = seen[1:, :] & seen[:-1, :] if along == 0 else seen[:, 1:] & seen[:, :-1]
+    return both & ((np.abs(np.diff(filled, axis=along)) > 6.0 * size) | (np.abs(np.diff(value, axis=along)) > 0.1))
 
 
 def _from_above(axes: Axes, field: DexelField, path: ToolPath | None) -> None:

@@ -146,26 +146,40 @@ def capsule_on_line(a0, o0, a1, o1, radius, o):
 
 
 @numba.njit(cache=True)
-def _cut_across(seg, count, along, lattice, move, outline, told):
-    """Shorten the lines along x or y by an upright tool on a level or a vertical move; return whether all had room."""
+def _cut_across(seg, count, along, lattice, move, outline, been, told):
+    """Shorten the lines along x or y by an upright tool on a level or a vertical move; return whether all had room.
+
+    `been` says that the tool has cut where the move begins: lines that it meets no farther than there are left alone.
+    """
     other = 1 - along
     origin, cell = lattice[0], lattice[1]
     bottom, top = min(move[0, 2], move[1, 2]), max(move[0, 2], move[1, 2])
     first = max(math.ceil((bottom - origin[2]) / cell[2]), 0)
     last = min(math.floor((top + outline[0, -1] - origin[2]) / cell[2]), seg.shape[0] - 1)
     left, right = min(move[0, other], move[1, other]), max(move[0, other], move[1, other])
+    low, high = np.empty(seg.shape[1]), np.empty(seg.shape[1])
+    begin, end, known = 0, -1, -1.0
     for k in range(first, last + 1):
         z = origin[2] + k * cell[2]
         radius = widest_between(outline, z - top, z - bottom)
         if radius <= 0.0:
             continue
-        begin = max(math.ceil((left - radius - origin[other]) / cell[other]), 0)
-        end = min(math.floor((right + radius - origin[other]) / cell[other]), seg.shape[1] - 1)
+        if radius != known:
+            # a cylinder is the same in all planes
+            known = radius
+            begin = max(math.ceil((left - radius - origin[other]) / cell[other]), 0)
+            end = min(math.floor((right + radius - origin[other]) / cell[other]), seg.shape[1] - 1)
+            for n in range(begin, end + 1):
+                o = origin[other] + n * cell[other]
+                low[n], high[n] = capsule_on_line(move[0, along], move[0, other], move[1, along], move[1, other], radius, o)
+                if been:
+                    half = radius * radius - (o - move[0, other]) ** 2
+                    half = math.sqrt(half) if half > 0.0 else -1.0
+                    if half > 0.0 and move[0, along] - half <= low[n] and move[0, along] + half >= high[n]:
+                        high[n] = -np.inf
         for n in range(begin, end + 1):
-            o = origin[other] + n * cell[other]
-            low, high = capsule_on_line(move[0, along], move[0, other], move[1, along], move[1, other], radius, o)
-            if high > low:
-                taken = cut(seg, count, k, n, low, high)
+            if high[n] > low[n]:
+                taken = cut(seg, count, k, n, low[n], high[n])
                 if taken < 0.0:
                     return False
                 told[along] += taken
@@ -362,9 +376,9 @@ def sweep_upright(segs, counts, lattice, places, moves, outline, peak, been, tol
         move = places[i : i + 2]
         level = move[0, 2] == move[1, 2]
         if level or (move[0, 0] == move[1, 0] and move[0, 1] == move[1, 1]):
-            if not _cut_across(segs[0], counts[0], 0, lattice, move, outline, told[i]):
+            if not _cut_across(segs[0], counts[0], 0, lattice, move, outline, been and level, told[i]):
                 return i
-            if not _cut_across(segs[1], counts[1], 1, lattice, move, outline, told[i]):
+            if not _cut_across(segs[1], counts[1], 1, lattice, move, outline, been and level, told[i]):
                 return i
             if not _cut_down(segs[2], counts[2], lattice, move, outline, peak, been and level, told[i]):
                 return i
@@ -410,66 +424,74 @@ def frustum_on_line(x, y, z, dx, dy, dz, z0, r0, z1, r1):
 
 
 @numba.njit(cache=True)
-def cut_leaning(seg, count, axes, lattice, frame, tip, outline, told):
-    """Shorten the lines of a grid by a tool that stands still, and return whether all had room.
+def _tool_on_line(frame, start, outline, along):
+    """Return between which places a line lies in a tool, from a point on it beside the tip on; of a tool that is not convex the hull."""
+    x = start[0] * frame[0, 0] + start[1] * frame[1, 0] + start[2] * frame[2, 0]
+    y = start[0] * frame[0, 1] + start[1] * frame[1, 1] + start[2] * frame[2, 1]
+    z = start[0] * frame[0, 2] + start[1] * frame[1, 2] + start[2] * frame[2, 2]
+    dx, dy, dz = frame[along, 0], frame[along, 1], frame[along, 2]
+    low, high = np.inf, -np.inf
+    for k in range(outline.shape[1] - 1):
+        if outline[0, k + 1] > outline[0, k]:
+            one, two = frustum_on_line(x, y, z, dx, dy, dz, outline[0, k], outline[1, k], outline[0, k + 1], outline[1, k + 1])
+            if two > one:
+                low, high = min(low, one), max(high, two)
+    return low, high
+
+
+@numba.njit(cache=True)
+def cut_leaning(seg, count, axes, lattice, frames, tips, outline, told):
+    """Shorten the lines of a grid by a convex tool on a step so short that it hardly turns, and return whether all had room.
+
+    A line that it meets at both ends of the step it meets everywhere between them.
 
     Parameters
     ----------
     axes : array of int (3,)
         Along which the lines lie, and the axes of the grid's two indices.
-    frame : array (3, 3)
-        Its columns are two directions across the tool's axis, and the axis.
-    tip : array (3,)
+    frames : array (2, 3, 3)
+        At both ends: two directions across the tool's axis, and the axis, as columns.
+    tips : array (2, 3)
     outline : array (2, p)
+        Convex, or one of its convex pieces.
     told : array (4,)
     """
     along, one, two = axes[0], axes[1], axes[2]
     origin, cell = lattice[0], lattice[1]
-    box = np.array([[np.inf, -np.inf], [np.inf, -np.inf]])
-    for k in range(outline.shape[1]):
-        for s, axis in enumerate((one, two)):
-            # a disc reaches as far as its radius times the sine of the angle between its axis and the direction
-            middle = tip[axis] + outline[0, k] * frame[axis, 2]
-            reach = outline[1, k] * math.sqrt(max(1.0 - frame[axis, 2] ** 2, 0.0))
-            box[s, 0], box[s, 1] = min(box[s, 0], middle - reach), max(box[s, 1], middle + reach)
+    box = np.empty((2, 2))
+    box[:, 0], box[:, 1] = np.inf, -np.inf
+    for end in range(2):
+        for k in range(outline.shape[1]):
+            for s, axis in enumerate((one, two)):
+                # a disc reaches as far as its radius times the sine of the angle between its axis and the direction
+                middle = tips[end, axis] + outline[0, k] * frames[end, axis, 2]
+                reach = outline[1, k] * math.sqrt(max(1.0 - frames[end, axis, 2] ** 2, 0.0))
+                box[s, 0], box[s, 1] = min(box[s, 0], middle - reach), max(box[s, 1], middle + reach)
     begin = max(math.ceil((box[0, 0] - origin[one]) / cell[one]), 0)
     end = min(math.floor((box[0, 1] - origin[one]) / cell[one]), seg.shape[0] - 1)
     first = max(math.ceil((box[1, 0] - origin[two]) / cell[two]), 0)
     last = min(math.floor((box[1, 1] - origin[two]) / cell[two]), seg.shape[1] - 1)
-    dx, dy, dz = frame[along, 0], frame[along, 1], frame[along, 2]
     far = np.max(outline[1])
-    across = math.sqrt(dx * dx + dy * dy)
+    start = np.zeros(3)
     for m in range(begin, end + 1):
-        p = origin[one] + m * cell[one] - tip[one]
         for n in range(first, last + 1):
-            q = origin[two] + n * cell[two] - tip[two]
-            held = count[m, n]
-            if held == 0:
+            if count[m, n] == 0:
                 continue
-            x = p * frame[one, 0] + q * frame[two, 0] - tip[along] * dx
-            y = p * frame[one, 1] + q * frame[two, 1] - tip[along] * dy
-            z = p * frame[one, 2] + q * frame[two, 2] - tip[along] * dz
-            if abs(x * dy - y * dx) >= far * across and across > 0.0:
-                continue
-            told[3] += 1.0
             low, high = np.inf, -np.inf
-            for k in range(outline.shape[1] - 1):
-                if outline[0, k + 1] <= outline[0, k]:
-                    continue
-                start, stop = frustum_on_line(x, y, z, dx, dy, dz, outline[0, k], outline[1, k], outline[0, k + 1], outline[1, k + 1])
-                if stop <= start:
-                    continue
-                if low <= high and (start > high + 1e-12 or stop < low - 1e-12):
-                    taken = cut(seg, count, m, n, low, high)
-                    if taken < 0.0:
-                        return False
-                    told[along] += taken
-                    low, high = start, stop
-                else:
-                    low, high = min(low, start), max(high, stop)
+            for pose in range(2):
+                start[along] = -tips[pose, along]
+                start[one] = origin[one] + m * cell[one] - tips[pose, one]
+                start[two] = origin[two] + n * cell[two] - tips[pose, two]
+                # the distance between the line and the tool's axis
+                b, d = frames[pose, one, 2], frames[pose, two, 2]
+                across = math.sqrt(b * b + d * d)
+                if abs(start[one] * d - start[two] * b) < far * across or across < 1e-12:
+                    near, away = _tool_on_line(frames[pose], start, outline, along)
+                    low, high = min(low, near), max(high, away)
             if high > low:
                 taken = cut(seg, count, m, n, low, high)
                 if taken < 0.0:
                     return False
                 told[along] += taken
+                told[3] += 1.0
     return True

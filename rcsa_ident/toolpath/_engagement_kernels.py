@@ -412,7 +412,7 @@ def _end_beside(seg, count, lattice, z, circle, frame, arcs, found, which):
 
 
 @numba.njit(cache=True)
-def engage_upright(segs, counts, lattice, tips, outline, edge, feed, rows, extent):
+def engage_upright(segs, counts, lattice, tips, outline, edge, feed, most, rows, extent):
     """Find where an upright tool that is about to move stands in material, plane by plane of the lattice; return how many rows there are.
 
     Parameters
@@ -426,6 +426,8 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, rows, exten
         Height to which its edges reach.
     feed : array (3,)
         Direction of the move, of length 1.
+    most : int
+        Planes that are looked at, at most; of more, every so many.
     rows : array (m, 3)
         Takes height above the tip, and where an arc begins and ends.
     extent : array (2,)
@@ -440,7 +442,11 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, rows, exten
     tip, cell = tips[1, 2], lattice[1, 2]
     first = max(math.ceil((tip + low - lattice[0, 2]) / cell), 0)
     last = min(math.floor((tip + high - lattice[0, 2]) / cell), segs[0].shape[0] - 1)
-    for k in range(first, last + 1):
+    every = max((last - first) // max(most - 1, 1), 1)
+    k, step = first - every, every * cell
+    while k < last:
+        # the last plane is one of them
+        k = min(k + every, last)
         z = lattice[0, 2] + k * cell
         radius, slope = radius_and_slope(outline, z - tip)
         if radius <= 0.0:
@@ -458,11 +464,11 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, rows, exten
         # the plane beside has no arc: the material ends before it, or where its arcs do half way
         if z - tip < extent[0]:
             end = _end_beside(segs[2], counts[2], lattice, z, circle, frame, arcs, found, 0)
-            extent[0] = (end if end > z - cell else z - 0.5 * cell) - tip if max(z - cell, end) > tip else 0.0
+            extent[0] = (end if end > z - step else z - 0.5 * step) - tip if max(z - step, end) > tip else 0.0
         top, last_found, last_radius = z, found, radius
         last_arcs[:found] = arcs[:found]
     if held:
         circle[2] = last_radius
         end = _end_beside(segs[2], counts[2], lattice, top, circle, frame, last_arcs, last_found, 1)
-        extent[1] = min((end if end < top + cell else top + 0.5 * cell) - tip, edge)
+        extent[1] = min((end if end < top + step else top + 0.5 * step) - tip, edge)
     return held if planes else -1

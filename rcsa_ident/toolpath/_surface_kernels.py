@@ -118,22 +118,67 @@ def occupied(seg, count, origin, cell, every, filled):
 
 
 @numba.njit(cache=True)
-def _between(seg, count, m, n, low, high, rises):
-    """Where the material of a line begins, or ends, between two places, as a share of the way; a half where its grid knows of nothing."""
+def _to_nearest_end(seg, count, m, n, which, place):
+    """Way from a place to the nearest end of this sense on a line; infinite where the line is not there or has none."""
+    found = np.inf
     if 0 <= m < seg.shape[0] and 0 <= n < seg.shape[1]:
         for k in range(count[m, n]):
-            end = seg[m, n, k, 0 if rises else 1]
-            if low <= end <= high:
-                return (end - low) / (high - low)
-    return 0.5
+            way = seg[m, n, k, which] - place
+            if abs(way) < abs(found):
+                found = way
+    return found
+
+
+@numba.njit(cache=True)
+def _slopes(seg, count, m, n, which, place, cell_one, cell_two):
+    """Slopes of the surface at an end of a line, towards the lines beside along both indices of the grid; infinite where there are none.
+
+    They are the mean of both sides where the surface is smooth, and that of the flatter side where it has an edge.
+    """
+    found = (0.0, 0.0)
+    for index in range(2):
+        one = 1 - index
+        before = _to_nearest_end(seg, count, m - one, n - index, which, place)
+        behind = _to_nearest_end(seg, count, m + one, n + index, which, place)
+        cell = cell_one if index == 0 else cell_two
+        if abs(abs(before) - abs(behind)) <= 0.5 * cell:
+            slope = 0.5 * (behind - before) / cell
+        else:
+            slope = (-before if abs(before) < abs(behind) else behind) / cell
+        found = (slope, found[1]) if index == 0 else (found[0], slope)
+    return found
+
+
+@numba.njit(cache=True)
+def _between(seg, count, m, n, low, high, which):
+    """Where the material of a line begins (0) or ends (1) between two places; half way where its grid knows of nothing."""
+    if 0 <= m < seg.shape[0] and 0 <= n < seg.shape[1]:
+        for k in range(count[m, n]):
+            if low <= seg[m, n, k, which] <= high:
+                return seg[m, n, k, which]
+    return 0.5 * (low + high)
+
+
+@numba.njit(cache=True)
+def _nearest_to_planes(square, right, mean, low, step, vertex):
+    """Find the point nearest to planes n . (x - p) = 0, by the sums of n n^T and n (n . (p - mean)); what they leave open is the mean's."""
+    for a in range(3):
+        square[a, a] += 0.05
+    one, two, three = square[0], square[1], square[2]
+    first, second, third = np.cross(two, three), np.cross(three, one), np.cross(one, two)
+    determinant = one[0] * first[0] + one[1] * first[1] + one[2] * first[2]
+    for a in range(3):
+        moved = mean[a] + (first[a] * right[0] + second[a] * right[1] + third[a] * right[2]) / determinant
+        vertex[a] = min(max(moved, low[a]), low[a] + step[a])
 
 
 @numba.njit(cache=True)
 def surface_net(segs, counts, lattice, every, filled, vertices, faces):
     """Find the surface between nodes inside and outside the material; return how many vertices and triangles it has.
 
-    Each cube of eight nodes that are not alike has a vertex, the mean of where its edges leave the material, and each edge that leaves it a
-    quadrangle between the vertices of the four cubes around it. A first call with no room in `vertices` and `faces` counts.
+    Each cube of eight nodes that are not alike has a vertex, nearest to the planes in which its edges leave the material [ju2002], and each
+    edge that leaves it a quadrangle between the vertices of the four cubes around it. A first call with no room in `vertices` and `faces`
+    counts.
 
     Parameters
     ----------
@@ -151,8 +196,8 @@ def surface_net(segs, counts, lattice, every, filled, vertices, faces):
     points, triangles = 0, 0
     write = vertices.shape[0] > 0
     step = every * lattice[1]
-    corner = np.empty(3)
-    node = np.empty(3, dtype=np.int64)
+    corner, mean, node = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)
+    points_of, normals, square, right = np.empty((12, 3)), np.empty((12, 3)), np.empty((3, 3)), np.empty(3)
     for i in range(nx - 1):
         below, here = here, below
         here[:] = -1
@@ -167,29 +212,42 @@ def surface_net(segs, counts, lattice, every, filled, vertices, faces):
                 points += 1
                 if not write:
                     continue
-                corner[:] = 0.0
-                edges = 0
+                mean[:], edges = 0.0, 0
                 for a in range(3):
-                    b, d = (a + 1) % 3, (a + 2) % 3
+                    corner[a] = lattice[0, a] + ((i, j, k)[a] - 1) * step[a]
+                for a in range(3):
+                    b, d = (2, 1) if a == 0 else ((2, 0) if a == 1 else (0, 1))
                     for s in range(4):
                         node[0], node[1], node[2] = i, j, k
                         node[b] += s & 1
                         node[d] += s >> 1
-                        one = filled[node[0], node[1], node[2]]
+                        inside = filled[node[0], node[1], node[2]]
                         node[a] += 1
-                        if one == filled[node[0], node[1], node[2]]:
+                        if inside == filled[node[0], node[1], node[2]]:
                             continue
-                        node[a] -= 1
-                        low = lattice[0, a] + (node[a] - 1) * step[a]
-                        x, y, z = (node[0] - 1) * every, (node[1] - 1) * every, (node[2] - 1) * every
-                        m, n = (z, y) if a == 0 else ((z, x) if a == 1 else (x, y))
-                        share = _between(segs[a], counts[a], m, n, low, low + step[a], not one)
-                        corner[b] += lattice[0, b] + (node[b] - 1) * step[b]
-                        corner[d] += lattice[0, d] + (node[d] - 1) * step[d]
-                        corner[a] += low + share * step[a]
+                        m, n, which = (node[b] - 1) * every, (node[d] - 1) * every, 1 if inside else 0
+                        point = points_of[edges]
+                        for c in range(3):
+                            point[c] = lattice[0, c] + (node[c] - 1) * step[c]
+                        point[a] = _between(segs[a], counts[a], m, n, corner[a], corner[a] + step[a], which)
+                        mean += point
+                        normal = normals[edges]
+                        slopes = _slopes(segs[a], counts[a], m, n, which, point[a], lattice[1, b], lattice[1, d])
+                        size = math.sqrt(1.0 + slopes[0] ** 2 + slopes[1] ** 2)
+                        # a surface that no line beside knows has no direction
+                        normal[:] = 0.0
+                        if size < 1e6:
+                            normal[a], normal[b], normal[d] = 1.0 / size, -slopes[0] / size, -slopes[1] / size
                         edges += 1
-                for a in range(3):
-                    vertices[here[j, k], a] = corner[a] / edges
+                mean /= edges
+                square[:], right[:] = 0.0, 0.0
+                for e in range(edges):
+                    off = np.dot(normals[e], points_of[e] - mean)
+                    for c in range(3):
+                        right[c] += normals[e, c] * off
+                        for f in range(3):
+                            square[c, f] += normals[e, c] * normals[e, f]
+                _nearest_to_planes(square, right, mean, corner, step, vertices[here[j, k]])
         for j in range(ny - 1):
             for k in range(nz - 1):
                 # the edges of three directions from the node (i, j, k), inside the lattice: four cubes around each
@@ -216,16 +274,6 @@ def surface_net(segs, counts, lattice, every, filled, vertices, faces):
 
 
 @numba.njit(cache=True)
-def _nearest_end(seg, count, m, n, which, place):
-    """Distance from a place to the nearest end of this sense on a line that may lie outside."""
-    found = np.inf
-    if 0 <= m < seg.shape[0] and 0 <= n < seg.shape[1]:
-        for k in range(count[m, n]):
-            found = min(found, abs(seg[m, n, k, which] - place))
-    return found
-
-
-@numba.njit(cache=True)
 def nodes_and_rest(seg, count, origin, cell, cell_one, cell_two):
     """Return how many nodes lie in the material of a grid, and what the surface encloses beside their cells, in cells.
 
@@ -243,8 +291,7 @@ def nodes_and_rest(seg, count, origin, cell, cell_one, cell_two):
                 for which in range(2):
                     beyond = (high - last if which == 1 else first - low) - 0.5
                     place = seg[m, n, k, which]
-                    one = min(_nearest_end(seg, count, m - 1, n, which, place), _nearest_end(seg, count, m + 1, n, which, place)) / cell_one
-                    two = min(_nearest_end(seg, count, m, n - 1, which, place), _nearest_end(seg, count, m, n + 1, which, place)) / cell_two
+                    one, two = _slopes(seg, count, m, n, which, place, cell_one, cell_two)
                     rest += beyond / (1.0 + one * one + two * two)
     return nodes, rest
 

@@ -186,8 +186,9 @@ class DexelField(Shown):
     def mesh(self) -> tuple[FloatArray, FloatArray]:
         """Return the material's surface: points, shape (v, 3) [m], and triangles, shape (f, 3), counterclockwise from outside.
 
-        A surface net: a point in each cell of the lattice that the surface goes through, the mean of where it crosses the cell's edges.
-        It is closed whatever was cut, rounds edges off by less than a cell, and leaves lines out where it would get too large.
+        Dual contours [ju2002]: a point in each cell of the lattice that the surface goes through, nearest to the planes in which it
+        crosses the cell's edges, so that edges stay sharp. It is closed whatever was cut, and leaves lines out where it would get too
+        large.
         """
         every = max(1, int(np.ceil((np.prod(np.array(self.shape, dtype=float)) / _DRAWN) ** (1.0 / 3.0))))
         shape = [(n - 1) // every + 1 for n in self.shape]

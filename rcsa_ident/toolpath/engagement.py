@@ -18,6 +18,8 @@ from rcsa_ident.toolpath.solid import ToolSolid
 
 #: A move that is shorter has no direction [m].
 _NOWHERE = 1e-9
+#: Slices of an upright tool at a place, at most: deeper cuts have thicker ones.
+_MOST_SLICES = 16
 #: Arcs of a place, at most.
 _MOST_ARCS = 4096
 _TURN = 2.0 * np.pi
@@ -182,7 +184,7 @@ def _upright(sweep: Sweep, move: int, feed: FloatArray, length: float, rows: Flo
     extent[:] = material_ahead(field.segs[2], field.counts[2], sweep.lattice, probe, sweep.rough, solid.edge)
     if not extent[1] > extent[0]:
         return 0
-    held = engage_upright(field.segs, field.counts, sweep.lattice, tips, sweep.outline, solid.edge, feed, rows, extent)
+    held = engage_upright(field.segs, field.counts, sweep.lattice, tips, sweep.outline, solid.edge, feed, _MOST_SLICES, rows, extent)
     if held < 0:
         # a layer between two planes has one slice in its middle
         middle, level, arcs = 0.5 * (extent[0] + extent[1]), np.linalg.norm(feed[:2]), np.empty((16, 2))

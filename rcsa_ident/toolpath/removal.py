@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from rcsa_ident.toolpath.solid import ToolSolid
 #: Sine of the angle by which a tool stands upright.
 _UPRIGHT = 1e-9
 #: By which ridges between substeps may stand, by default, as a share of the distance between lines.
-TOLERANCE = 0.02
+TOLERANCE = 0.01
 _AXES = tuple(np.array(axes) for axes in GRIDS)
 
 
@@ -38,7 +39,7 @@ class Sweep(Shown):
         Cut in place.
     solid : ToolSolid
     path : ToolPath
-    tolerance : float [m], default a fiftieth of the distance between lines
+    tolerance : float [m], default a hundredth of the distance between lines
         By which the cut surface may stand off the exact one.
 
     Examples
@@ -69,13 +70,19 @@ class Sweep(Shown):
     #: The outline with as few points as the tolerance asks for.
     rough: FloatArray = dataclass_field(init=False)
     _peak: int = dataclass_field(init=False)
+    #: The rough outline in convex pieces.
+    _pieces: list[FloatArray] = dataclass_field(init=False)
 
     def __post_init__(self) -> None:
         default = TOLERANCE * float(self.field.cell.max())
         self.tolerance = default if self.tolerance is None else positive("tolerance", self.tolerance, "m")
         self.told = np.zeros((max(len(self.path) - 1, 0), 4))
         self.lattice, self.outline, self._peak = self.field.lattice, self.solid.outline, self.solid.peak
-        self.rough = self.solid.coarser(0.1 * self.tolerance).outline
+        rough = self.solid.coarser(0.1 * self.tolerance)
+        self.rough = rough.outline
+        self._pieces = (
+            [self.rough] if rough.convex else [np.ascontiguousarray(self.rough[:, k : k + 2]) for k in range(rough.heights.size - 1)]
+        )
         stands = (np.hypot(self.path.axes[:, 0], self.path.axes[:, 1]) < _UPRIGHT) & (self.path.axes[:, 2] > 0.0)
         ways = self.path.moves
         ramp = (ways[:, 2] != 0.0) & np.any(ways[:, :2] != 0.0, axis=1)
@@ -134,11 +141,15 @@ class Sweep(Shown):
                 break
 
     def _run_leaning(self, move: int) -> None:
-        outline, lattice = self.rough, self.lattice
-        for tip, frame in poses_between(self.path, move, self.solid, self.tolerance):
-            for grid, axes in enumerate(_AXES):
-                while not cut_leaning(self.field.segs[grid], self.field.counts[grid], axes, lattice, frame, tip, outline, self.told[move]):
-                    self.field.make_room()
+        poses = list(poses_between(self.path, move, self.solid, self.tolerance))
+        for (tip, frame), (next_tip, next_frame) in pairwise(poses):
+            tips, frames = np.stack([tip, next_tip]), np.stack([frame, next_frame])
+            for piece in self._pieces:
+                for grid, axes in enumerate(_AXES):
+                    seg, count = self.field.segs[grid], self.field.counts[grid]
+                    while not cut_leaning(seg, count, axes, self.lattice, frames, tips, piece, self.told[move]):
+                        self.field.make_room()
+                        seg = self.field.segs[grid]
 
 
 def made_by(points: FloatArray, path: ToolPath, moves: np.ndarray, radius: float, near: float) -> np.ndarray:

@@ -50,6 +50,11 @@ from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.toolpath.dexel import DexelField
+from rcsa_ident.toolpath.engagement import engagement_along
+from rcsa_ident.toolpath.path import ToolPath
+from rcsa_ident.toolpath.removal import Sweep
+from rcsa_ident.toolpath.solid import ToolSolid
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles
 from rcsa_ident.workflows.listen import listen_to
@@ -162,6 +167,15 @@ def _robot() -> None:
     accelerations(posed(arm, np.zeros(1)), np.zeros(1), np.zeros(1), arm.gravity)
 
 
+def _removal() -> None:
+    """Level, in a thin layer, down a ramp and leaning, out of the inside of a surface."""
+    block = DexelField.block(np.zeros(3), np.array([0.02, 0.02, 0.01]), 2e-3)
+    field, solid = DexelField.from_mesh(*block.mesh(), 2e-3), ToolSolid.of(_CUTTER, 0.02)
+    places = np.array([[0.0, 0.0, 0.0099], [0.01, 0.01, 0.0099], [0.01, 0.01, 0.005], [0.02, 0.01, 0.004], [0.02, 0.02, 0.004]])
+    axes = np.array([[0.0, 0.0, 1.0]] * 4 + [[0.1, 0.0, 1.0]])
+    engagement_along(Sweep(field, solid, ToolPath(places, axes=axes)))
+
+
 def _lobes_in_time() -> None:
     process, speeds = MillingProcess(_CUTTER, _COEFFICIENTS, _CONDITIONS.engagement), np.array([900.0])
     for method in (FullDiscretisation(), TimeDomain(periods=20)):
@@ -200,6 +214,7 @@ STEPS: dict[str, Callable[[], None]] = {
     "lobes": _lobes,
     "lobes in time": _lobes_in_time,
     "robot": _robot,
+    "material removal": _removal,
     "force observer": _observer,
     "virtual machine": _virtual_machine,
 }

@@ -12,6 +12,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.machining_setup import BareCutter, Tooling
 from rcsa_ident.shown import Shown
+from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.toolpath.dexel import DexelField, memory_of
 from rcsa_ident.toolpath.engagement import PathEngagement, engagement_along
 from rcsa_ident.toolpath.path import ToolPath
@@ -170,7 +171,10 @@ def remove_along(
 
 def _misplaced(solid: ToolSolid, path: ToolPath, low: FloatArray, high: FloatArray) -> list[str]:
     """What is odd about where path and stock lie, and how large the tool is beside the stock."""
-    first, last = path.places.min(axis=0) - solid.radius, path.places.max(axis=0) + solid.radius
+    upright = np.all(path.axes[:, 2] > 1.0 - 1e-12)
+    # what the tool reaches around its tips
+    aside = np.full(3, solid.radius if upright else np.hypot(solid.radius, solid.length))
+    first, last = path.places.min(axis=0) - aside * [1.0, 1.0, not upright], path.places.max(axis=0) + aside
     last[2] += solid.length
     gap = float(np.linalg.norm(np.maximum(np.maximum(low - last, first - high), 0.0)))
     size = float(np.linalg.norm(high - low))
@@ -212,6 +216,12 @@ def _few(told: dict[str, float], most: int = 5) -> list[tuple[str, float]]:
     return [*items[:most], (f"{len(items) - most} more lines", sum(volume for _, volume in items[most:]))]
 
 
+def _holder(assembly: ToolAssembly) -> list[tuple[str, float, float]]:
+    """What stands above the tool: name, height of its lower face above the tip and radius, segment by segment."""
+    heights = assembly.stickout + np.concatenate([[0.0], np.cumsum([each.length for each in assembly.holder])])
+    return [("the holder", float(heights[k]), 0.5 * max(each.diameter, each.end)) for k, each in enumerate(assembly.holder)]
+
+
 class _Guard:
     """Looks before each move whether what does not cut would stand in material: shank and holder of an upright tool.
 
@@ -220,11 +230,7 @@ class _Guard:
 
     def __init__(self, sweep: Sweep, tooling: Tooling) -> None:
         self._sweep = sweep
-        stickout = tooling.assembly.stickout
-        heights = np.concatenate([[0.0], np.cumsum([each.length for each in tooling.assembly.holder])])
-        self._parts = [
-            ("the holder", stickout + heights[k], 0.5 * max(each.diameter, each.end)) for k, each in enumerate(tooling.assembly.holder)
-        ]
+        self._parts = [] if isinstance(tooling, BareCutter) else _holder(tooling.assembly)
         solid = sweep.solid
         if solid.edge < solid.length - 1e-9:
             self._parts.insert(0, ("the shank above the edges", solid.edge, float(solid.radii[-1])))

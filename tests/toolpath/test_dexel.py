@@ -130,6 +130,14 @@ def test_lines_get_room_when_they_need_it():
     assert field.counts[2].max() == 5
 
 
+def test_leaning_tools_leave_no_ridges_along_the_lines():
+    """Between the places into which a move is cut up nothing stays."""
+    field = DexelField.block(np.zeros(3), HIGH, CELL)
+    axes = np.array([[0.2, 0.1, 1.0], [-0.1, 0.2, 1.0]])
+    Sweep(field, FLAT, ToolPath(np.array([[-0.01, 0.014, 0.008], [0.07, 0.016, 0.007]]), axes=axes)).run()
+    assert max(int(count.max()) for count in field.counts) == 2
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 0.06), st.floats(0.0, 0.03), st.floats(0.004, 0.013)), min_size=2, max_size=5))
 def test_material_only_gets_less_and_no_order_matters(places):
@@ -174,7 +182,7 @@ def test_a_surface_of_triangles_encloses_what_a_boolean_says(seed):
     points, faces = field.mesh()
     net = manifold3d.Manifold(manifold3d.Mesh64(points, faces.astype(np.uint64)))
     assert net.status() == manifold3d.Error.NoError
-    assert net.volume() == pytest.approx(body.volume(), rel=6e-3)
+    assert net.volume() == pytest.approx(body.volume(), rel=2e-3)
 
 
 def test_what_is_no_stock_is_refused():
