@@ -53,7 +53,7 @@ def lobes(engagement: Engagement, angle: float = 0.0) -> ToolChange:
 
 @pytest.mark.parametrize("degrees", [0.0, 90.0])
 def test_a_shoulder_has_the_margin_the_force_and_the_wall_of_its_cut(degrees: float) -> None:
-    depth, angle = 0.002, np.radians(degrees)
+    depth, angle = 0.003, np.radians(degrees)
     way, left = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     # half of the cutter, on the right of the way: down-milling
     corners = np.array([0.02 * way, 0.06 * way, 0.02 * way - 0.02 * left, 0.06 * way - 0.02 * left])
