@@ -169,20 +169,21 @@ def _rendered(
                 nearer = near > depth[rows, columns]
                 depth[rows[nearer], columns[nearer]] = near[nearer]
                 value[rows[nearer], columns[nearer]] = lit[nearer]
-    # a line where the surface turns, or where something nearer hides what is behind: surfaces of one slope are equally bright
-    value[1:, :] *= np.where(_jumps(depth, value, size, 0), 0.5, 1.0)
-    value[:, 1:] *= np.where(_jumps(depth, value, size, 1), 0.5, 1.0)
+    value = _with_edges(value, depth, size)
     image = np.zeros((*shape, 4))
     image[..., :3], image[..., 3] = np.clip(1.25 * value, 0.0, 1.0), np.isfinite(depth)
     return image
 
 
-def _jumps(depth: FloatArray, value: FloatArray, size: float, along: int) -> np.ndarray:
-    """Between which neighbours of an image there is an edge."""
+def _with_edges(value: FloatArray, depth: FloatArray, size: float) -> FloatArray:
+    """Brightness, or colours, with a line where the surface turns or hides what is behind: surfaces of one slope are equally bright."""
     seen = np.isfinite(depth)
-    filled = np.where(seen, depth, 0.0)
-    both = seen[1:, :] & seen[:-1, :] if along == 0 else seen[:, 1:] & seen[:, :-1]
-    return both & ((np.abs(np.diff(filled, axis=along)) > 6.0 * size) | (np.abs(np.diff(value, axis=along)) > 0.1))
+    filled, colours = np.where(seen, depth, 0.0), value.reshape(*depth.shape, -1)
+    bright, edge = colours.mean(axis=2), np.zeros(depth.shape, dtype=bool)
+    for along, here, before in ((0, np.s_[1:, :], np.s_[:-1, :]), (1, np.s_[:, 1:], np.s_[:, :-1])):
+        jumps = (np.abs(np.diff(filled, axis=along)) > 6.0 * size) | (np.abs(np.diff(bright, axis=along)) > 0.1)
+        edge[here] |= jumps & seen[here] & seen[before]
+    return (colours * np.where(edge, 0.5, 1.0)[..., None]).reshape(value.shape)
 
 
 def _from_above(axes: Axes, field: DexelField, path: ToolPath | None) -> None:

@@ -21,23 +21,23 @@ def tooling(profile=None, stickout=0.03):
     return Tooling("T1", Cutter(2, 0.01, profile=profile), ToolAssembly(tool, (BeamSegment(0.06, 0.04, steel, inner_diameter=0.01),), 0.03))
 
 
+def removal(tool, path, block=None, surface=None, cell=None, step=None):
+    return remove_along(tool, path, field_of(tool, block, surface, cell), step)
+
+
 def slot(z=0.018, **told):
     return ToolPath(np.array([[-0.006, 0.015, z], [0.046, 0.015, z]]), **told)
 
 
-def removed(tool, path, block=None, surface=None, cell=None, step=None):
-    return remove_along(tool, path, field_of(tool, block, surface, cell), step)
-
-
 def test_a_slot_through_a_block_and_through_its_surface():
-    found = removed(tooling(), slot(feed=[np.nan, 0.01]), (LOW, HIGH), step=1e-3)
+    found = removal(tooling(), slot(feed=[np.nan, 0.01]), (LOW, HIGH), step=1e-3)
     assert found.removed == pytest.approx(0.04 * 0.01 * 2e-3, rel=1e-3)
     assert found.engagement.volume.sum() == pytest.approx(found.removed)
     assert found.arc_volume.sum() == pytest.approx(found.removed, rel=1e-6)
     assert len(found.path) == 53
     assert found.part.cell.max() == pytest.approx(0.25e-3)
     assert found.warnings == ()
-    other = removed(tooling(), slot(), surface=box(LOW, HIGH), step=1e-3)
+    other = removal(tooling(), slot(), surface=box(LOW, HIGH), step=1e-3)
     assert other.removed == pytest.approx(found.removed, rel=1e-9)
 
 
@@ -47,43 +47,43 @@ def test_rapid_moves_through_material_are_told_by_their_lines():
         feed=[RAPID, RAPID, 0.01, RAPID],
         line=[1, 2, 3, 4],
     )
-    found = removed(tooling(), path, (LOW, HIGH), step=1e-3)
+    found = removal(tooling(), path, (LOW, HIGH), step=1e-3)
     assert [text.split(":")[0] for text in found.warnings] == ["RAPID MOVE THROUGH MATERIAL at line 4"]
 
 
 def test_shank_and_holder_in_material_are_told():
     short = Profile.ball(0.01, length=0.006)
-    deep = removed(tooling(short), slot(0.01, line=[1, 7]), (LOW, HIGH), step=1e-3)
+    deep = removal(tooling(short), slot(0.01, line=[1, 7]), (LOW, HIGH), step=1e-3)
     assert [text.split(" from")[0] for text in deep.warnings] == ["COLLISION: the shank above the edges stands in material"]
     assert deep.warnings[0].endswith("line 7")
-    low = removed(tooling(stickout=0.012), slot(0.006), (LOW, HIGH), step=1e-3)
+    low = removal(tooling(stickout=0.012), slot(0.006), (LOW, HIGH), step=1e-3)
     assert [text.split(" from")[0] for text in low.warnings] == ["COLLISION: the holder stands in material"]
     leaning = ToolPath(slot(0.006).places, axes=np.tile([0.0, 0.3, 1.0], (2, 1)))
-    found = removed(tooling(stickout=0.012), leaning, (LOW, HIGH), cell=1e-3, step=4e-3)
+    found = removal(tooling(stickout=0.012), leaning, (LOW, HIGH), cell=1e-3, step=4e-3)
     assert any(text.startswith("COLLISION: the holder") for text in found.warnings)
 
 
 def test_paths_that_miss_are_told_and_far_ones_refused():
-    above = removed(tooling(), slot(0.021), (LOW, HIGH))
+    above = removal(tooling(), slot(0.021), (LOW, HIGH))
     assert above.removed == 0.0
     assert above.warnings == ("the path never meets the stock: the tool stays 1 mm or more away from it",)
     with pytest.raises(InputError, match="millimetres"):
-        removed(tooling(), ToolPath(1e3 * slot().places), (LOW, HIGH))
-    small = removed(tooling(), slot(0.0), (LOW, 0.2 * HIGH), cell=1e-3)
+        removal(tooling(), ToolPath(1e3 * slot().places), (LOW, HIGH))
+    small = removal(tooling(), slot(0.0), (LOW, 0.2 * HIGH), cell=1e-3)
     assert any("is larger than the stock" in text for text in small.warnings)
 
 
 def test_cells_and_steps_that_fit_no_memory_are_refused():
     with pytest.raises(InputError, match="GB"):
-        removed(tooling(), slot(), (LOW, HIGH), cell=5e-7)
+        removal(tooling(), slot(), (LOW, HIGH), cell=5e-7)
     with pytest.raises(InputError, match="places"):
-        removed(tooling(), slot(), (LOW, HIGH), step=1e-9)
+        removal(tooling(), slot(), (LOW, HIGH), step=1e-9)
     with pytest.raises(InputError, match="a block or a surface"):
-        removed(tooling(), slot())
+        removal(tooling(), slot())
     assert default_cell(0.005, HIGH) == 0.25e-3
 
 
 def test_a_coarse_cell_is_told():
-    found = removed(tooling(), slot(), (LOW, HIGH), cell=1e-3, step=2e-3)
+    found = removal(tooling(), slot(), (LOW, HIGH), cell=1e-3, step=2e-3)
     assert any("less exact angles" in text for text in found.warnings)
     assert found.removed == pytest.approx(0.04 * 0.01 * 2e-3, rel=2e-2)
