@@ -31,6 +31,7 @@ CLAIMS = (
     "robot",
     "urdf",
     "compensation",
+    "paths",
     "removal",
 )
 #: Each is a module with ``main(arguments)``.

@@ -52,6 +52,8 @@ class MilledPart:
     frame : PathFrame
     walls : Walls
         What is left, in the frame's axes.
+    cut : array, shape (2, slices, columns)
+        Which columns of the walls the tool has cut.
     done : float [m]
         Up to where along them the walls are finished.
     radii : array, shape (slices,) [m]
@@ -73,6 +75,7 @@ class MilledPart:
     swing: FloatArray
     frame: PathFrame
     walls: Walls
+    cut: np.ndarray
     done: float
     radii: FloatArray
     heights: FloatArray
@@ -89,7 +92,7 @@ class MilledPart:
         behind = (x >= 0.0) & (x <= self.done)
         for side in (0, 1):
             error = self.walls.tops[side][:, behind] + self.radii[:, None]
-            own = np.all(np.abs(error) < _OTHER_WALL * self.radii[:, None], axis=0)
+            own = np.all((np.abs(error) < _OTHER_WALL * self.radii[:, None]) & self.cut[side][:, behind], axis=0)
             if np.count_nonzero(own) > 1:
                 yield side, x[behind][own], error[:, own]
 
@@ -287,6 +290,7 @@ class _Marcher:
 
     def _turns(self, move: int, found: March, frame: PathFrame, walls: Walls, cut: Cut, here: FloatArray, x: FloatArray) -> MilledPart:
         """What happened, turn by turn; a turn that is not whole waits for the next part."""
+        assert self.before is not None
         into = np.eye(3)
         into[:2, :2] = frame.turn
         places = np.column_stack([frame.back(np.column_stack([x, np.zeros_like(x)])), np.full(x.size, here[2])])
@@ -307,6 +311,7 @@ class _Marcher:
             np.linalg.norm(np.ptp(turns[..., 7:9], axis=1), axis=1),
             frame,
             walls,
+            self.before[2],
             float(x[-1] - (x[min(steps, x.size - 1)] - x[0])),
             cut.parts.radius,
             cut.parts.height,

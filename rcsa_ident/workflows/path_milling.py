@@ -25,10 +25,12 @@ from rcsa_ident.workflows.path_stability import stations_along
 from rcsa_ident.workflows.robot_milling import arm_carrier
 from rcsa_ident.workflows.tool_change import ToolChange
 
-#: Share of its swing by which a tip that chatters stands elsewhere after a turn, what counts as standing still [m], and turns that tell.
-#: Below the limit it comes back to a tenth of that (tests/workflows/test_path_milling.py).
-_ELSEWHERE, _STILL, _FEWEST = 0.05, 1e-7, 9
-#: What falls further from one half of a move to the other dies out.
+#: Share of its swing by which the tip stands elsewhere after a turn where it chatters whatever the cut does; and where the cut stays as it
+#: is, its mean force to a tenth: below the limit it comes back to a fifth of that (tests/workflows/test_path_milling.py).
+_FAR, _ELSEWHERE, _SAME = 0.15, 0.01, 0.1
+#: What counts as standing still [m], turns that tell, and how much more it may stand elsewhere for how much the way bends a turn [1/rad].
+_STILL, _FEWEST, _BENT = 1e-7, 9, 2.0
+#: What falls further from the first third of a run to the last one dies out.
 _DYING = 0.8
 #: Between places of walls that are told [m].
 _SURFACE = 2e-5
@@ -44,6 +46,10 @@ class PathMilling:
     ----------
     move : array of int, shape (n,)
         That each turn belongs to.
+    run : array of int, shape (n,)
+        Which moves belong together: those of one line of a program, as the chords of an arc do.
+    bend : array, shape (n,) [rad]
+        By which the way has turned since the turn before.
     time : array, shape (n,) [s]
     places : array, shape (n, 3) [m]
         Where the tip was sent.
@@ -69,6 +75,8 @@ class PathMilling:
     """
 
     move: np.ndarray
+    run: np.ndarray
+    bend: FloatArray
     time: FloatArray
     places: FloatArray
     mean_force: FloatArray
@@ -83,20 +91,26 @@ class PathMilling:
 
     @property
     def chattering(self) -> tuple[int, ...]:
-        """Moves whose tip does not come back to where it was a turn before, and does so no better from their first half to the second.
+        """First moves of runs whose tip does not come back to where it was a turn before: by much, or while the cut stays as it is.
 
-        Their beginning and end, where the tool comes and goes, are left aside.
+        Their beginning and end, where the tool comes and goes, are left aside. Where the way bends the tip turns with it; where the cut
+        changes it moves on; and what dies out is no chatter.
         """
         found = []
-        for move in np.unique(self.move):
-            own = np.flatnonzero((self.move == move) & (self.peak_force > 0.0))
+        for run in np.unique(self.run):
+            own = np.flatnonzero((self.run == run) & (self.peak_force > 0.0))
             inner = own[own.size // 5 : own.size - own.size // 5]
             if inner.size < _FEWEST:
                 continue
-            early, late = (float(np.median(self.beside_turns[half])) for half in np.array_split(inner, 2))
-            swing = float(np.median(self.swing[inner]))
-            if late > max(_ELSEWHERE * swing, _STILL) and late > _DYING * early:
-                found.append(int(move))
+            thirds = np.array_split(inner, 3)
+            beside = np.array([np.median(self.beside_turns[third]) for third in thirds])
+            swing = np.array([np.median(self.swing[third]) for third in thirds])
+            force = np.array([np.median(np.linalg.norm(self.mean_force[third], axis=1)) for third in thirds])
+            bent = _BENT * float(np.mean(self.bend[inner]))
+            wild = np.any(beside > np.maximum((_FAR + bent) * swing, 10.0 * _STILL))
+            steady = np.ptp(force) < _SAME * np.mean(force) and beside[2] > _DYING * beside[0]
+            if wild or (steady and beside[2] > max((_ELSEWHERE + bent) * swing[2], _STILL)):
+                found.append(int(self.move[own[0]]))
         return tuple(found)
 
     @property
@@ -137,7 +151,7 @@ class PathMilling:
         lines = sorted({int(path.line[move + 1]) for move in self.chattering})
         if lines:
             count = len(self.chattering)
-            where = f"on {count} move{'s' if count > 1 else ''}" + (f", lines {', '.join(map(str, lines[:8]))}" if any(lines) else "")
+            where = f"on line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:8]))}" if any(lines) else f"on {count} of its moves"
             told.append(f"it chatters {where}{' and others' if len(lines) > 8 else ''}")
         else:
             told.append("no move chatters")
@@ -202,7 +216,7 @@ def mill_path(
                 found = roughness(error[len(error) // 2], part.walls.spacing, cutoff)
                 worst = found if worst is None or found.mean > worst.mean else worst
         # walls take far more memory than what is told of a turn
-        parts[-1] = replace(part, walls=_NO_WALLS)
+        parts[-1] = replace(part, walls=_NO_WALLS, cut=_NO_WALLS.tops)
         if progress is not None:
             progress(int(1e4 * done[part.move + 1]), int(1e4 * done[-1]))
     rows = [np.concatenate([getattr(part, name) for part in parts]) if parts else np.zeros((0, 3)) for name in _ROWS]
@@ -211,10 +225,16 @@ def mill_path(
     move = np.repeat([part.move for part in parts], [part.time.size for part in parts]) if parts else np.zeros(0, dtype=int)
     seen = once[:, :2] - mean_tip[:, :2]
     beside = np.linalg.norm(np.diff(seen, axis=0, prepend=seen[:1]), axis=1)
+    way = np.arctan2(path.moves[move, 1], path.moves[move, 0])
+    bend = np.abs(np.angle(np.exp(1j * np.diff(way, prepend=way[:1]))))
+    lines = np.where(path.line[move + 1] > 0, path.line[move + 1], -1 - move)
+    run = np.cumsum(np.diff(lines, prepend=lines[:1]) != 0)
     # at corners and after a rest it stands elsewhere for another reason
-    beside[np.flatnonzero(np.diff(move)) + 1] = 0.0
+    beside[np.flatnonzero(np.diff(run)) + 1] = 0.0
     return PathMilling(
         move,
+        run,
+        bend,
         time,
         places,
         mean_force,

@@ -19,7 +19,8 @@ from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.lobes import both_directions, stability_lobes
-from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.multiplier_limits import longest_step
+from rcsa_ident.stability.stability_map import MonodromyMethod
 from rcsa_ident.stability.surface_error import forced_vibration, surface_location_error
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.engagement import PathEngagement
@@ -27,7 +28,7 @@ from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.units import to_rpm
 from rcsa_ident.workflows.robot_milling import feed_turn
 from rcsa_ident.workflows.robot_postures import following
-from rcsa_ident.workflows.tool_change import ToolChange
+from rcsa_ident.workflows.tool_change import ToolChange, modes_of
 
 #: Farther from chatter than this nobody asks how far: a margin is told up to it.
 FARTHEST = 4.0
@@ -191,7 +192,7 @@ def cuts_along(
         groups.setdefault(key, []).append(move)
         cuts.setdefault(key, (station, engagement, depth))
     warnings: list[str] = []
-    tips: dict[tuple[int, float], Receptance | TipModes] = {}
+    tips: dict[tuple[int, float], tuple[Receptance | TipModes, Receptance | TipModes]] = {}
     for done, (key, which) in enumerate(groups.items()):
         station, engagement, depth = cuts[key]
         first = which[0]
@@ -205,8 +206,9 @@ def cuts_along(
         one = replace(change, machine=station.machine, cut=cut, speeds=speed[first : first + 1])
         place = id(station.machine), float(speed[first])
         if place not in tips:
-            ((_, tips[place]),) = one.tips(one.speeds, one.omega, spread=change.draws > 0)
-        answer = _Answer.of(one, tips[place], depth)
+            ((_, tip),) = one.tips(one.speeds, one.omega, spread=change.draws > 0)
+            tips[place] = tip, modes_of(tip, one.process) if change.method.needs == "modes" else tip
+        answer = _Answer.of(one, *tips[place], depth)
         for name, value in (
             ("margin", answer.margin),
             ("low", answer.low),
@@ -287,9 +289,14 @@ class _Answer:
     warnings: Sequence[str]
 
     @classmethod
-    def of(cls, change: ToolChange, tip: Receptance | TipModes, depth: float) -> _Answer:
+    def of(cls, change: ToolChange, tip: Receptance | TipModes, modes: Receptance | TipModes, depth: float) -> _Answer:
+        """Of a tip, and of what stands for it where a method wants modes."""
         process = change.process
-        margin, low, chatter, warnings = _margin(change, tip, process, depth)
+        if isinstance(process.engagement, Engagement):
+            margin, low, chatter, warnings = _margin(change, tip, process, depth)
+        else:
+            margin, chatter, warnings = _strength(change, modes, process, depth)
+            low = margin
         speed = float(change.speeds[0])
         angle = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
         force = force_history(process.cutter, process.conditions(speed, depth), process.coefficients, angle, _SLICES) * [1.0, 1.0, -1.0]
@@ -309,33 +316,41 @@ class _Answer:
 def _margin(
     change: ToolChange, tip: Receptance | TipModes, process: MillingProcess, depth: float
 ) -> tuple[float, float, float, Sequence[str]]:
-    """How far a cut is from chatter, what drawn machines reach, the frequency of chatter, and what speaks against it."""
+    """How many times as deep a cut becomes unstable, what drawn machines reach, the frequency of chatter, and what speaks against it."""
+    found = stability_lobes(tip, process, change.speeds, FARTHEST * depth, change.method, change.draws)
+    margin = min(float(found.limit_depth[0]) / depth, FARTHEST)
+    low = margin if found.drawn is None else min(float(found.limit_quantile(0.95)[0]) / depth, margin)
+    return margin, low, float(found.chatter_frequency[0]), found.warnings
 
-    def lobes(of: MillingProcess, deepest: float, draws: int = 0) -> StabilityLobes:
-        return stability_lobes(tip, of, change.speeds, deepest, change.method, draws)
 
-    if isinstance(process.engagement, Engagement):
-        found = lobes(process, FARTHEST * depth, change.draws)
-        margin = min(float(found.limit_depth[0]) / depth, FARTHEST)
-        low = margin if found.drawn is None else min(float(found.limit_quantile(0.95)[0]) / depth, margin)
-        return margin, low, float(found.chatter_frequency[0]), found.warnings
+def _strength(change: ToolChange, tip: Receptance | TipModes, process: MillingProcess, depth: float) -> tuple[float, float, Sequence[str]]:
+    """How many times stronger the material may be until a cut of this very depth chatters, its frequency then, and what is said."""
+    speed, said, at = float(change.speeds[0]), list[str](), np.nan
 
-    def stronger(times: float) -> StabilityLobes:
+    def unstable(times: float) -> bool:
+        nonlocal at
         c = process.coefficients
-        return lobes(replace(process, coefficients=replace(c, tangential=times * c.tangential)), depth)
+        harder = replace(process, coefficients=replace(c, tangential=times * c.tangential))
+        if isinstance(change.method, MonodromyMethod):
+            assert isinstance(tip, TipModes)
+            cut = change.method.monodromy(tip, harder)
+            found = cut.multiplier(speed, depth, longest_step(cut), waves=True)
+            if abs(found.value) >= 1.0:
+                at = float(found.omega[np.argmax(found.motion)]) if found.omega.size else np.nan
+            return abs(found.value) >= 1.0
+        lobes = stability_lobes(tip, harder, change.speeds, depth, change.method, 0)
+        if np.isfinite(lobes.limit_depth[0]):
+            at = float(lobes.chatter_frequency[0])
+            said.extend(lobes.warnings)
+        return bool(np.isfinite(lobes.limit_depth[0]))
 
-    highest = stronger(FARTHEST)
-    if not np.isfinite(highest.limit_depth[0]):
-        return FARTHEST, FARTHEST, np.nan, highest.warnings
-    stable, unstable, at = 1.0 / FARTHEST, FARTHEST, highest
-    while unstable > (1.0 + _MARGIN) * stable:
-        middle = float(np.sqrt(stable * unstable))
-        found = stronger(middle)
-        if np.isfinite(found.limit_depth[0]):
-            unstable, at = middle, found
-        else:
-            stable = middle
-    return stable, stable, float(at.chatter_frequency[0]), at.warnings
+    if not unstable(FARTHEST):
+        return FARTHEST, np.nan, said
+    low, high = 1.0 / FARTHEST, FARTHEST
+    while high > (1.0 + _MARGIN) * low:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if unstable(middle) else (middle, high)
+    return low, at, said
 
 
 def described(found: CutsAlong, path: ToolPath) -> str:

@@ -204,7 +204,7 @@ class ToolChange:
         parts, order = [], []
         for places, tip in self.tips(speeds):
             order.append(places)
-            parts.append(_FITTING.lobes(_modes_of(tip, self.process), self.process, speeds[places], self.max_depth))
+            parts.append(_FITTING.lobes(modes_of(tip, self.process), self.process, speeds[places], self.max_depth))
         found = StabilityLobes.joined(parts, order)
         preview = self.limits(speeds, DEEPER * self.max_depth)
         if preview.drawn is None:
@@ -351,8 +351,8 @@ def _apart(found: Sequence[Place], count: int = 3) -> list[Place]:
     return kept[:count]
 
 
-def _modes_of(tip: Receptance | TipModes, process: MillingProcess) -> TipModes:
-    """A tip's modes, fitted where they are not known."""
+def modes_of(tip: Receptance | TipModes, process: MillingProcess) -> TipModes:
+    """Return a tip's modes, fitted where they are not known."""
     if isinstance(tip, TipModes):
         return tip
     return fitted_modes(directions_for(process, tip))[0]
@@ -411,7 +411,7 @@ def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> Stabili
     speeds, depth = np.unique(change.speeds), change.max_depth * np.arange(1, depths + 1) / depths
     parts = []
     for places, tip in change.tips(speeds):
-        parts.append(stability_map(_modes_of(tip, change.process), change.process, speeds[places], depth, method, full))
+        parts.append(stability_map(modes_of(tip, change.process), change.process, speeds[places], depth, method, full))
     return StabilityMap.joined(parts)
 
 
