@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +20,7 @@ from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import TipSource
-    from rcsa_ident.machining_setup import CutSpec, Tooling
+    from rcsa_ident.machining_setup import Tooling
     from rcsa_ident.toolpath.path import ToolPath
     from rcsa_ident.workflows.path_milling import PathMilling
     from rcsa_ident.workflows.path_removal import PathRemoval
@@ -34,30 +35,34 @@ Files = Annotated[
         show_default=False,
     ),
 ]
-Posture = Annotated[
-    str | None, typer.Option(metavar="'Q1 Q2 ...'", help="Of a robot: angles near those of the first place, degrees.", show_default=False)
-]
-Speed = Annotated[float | None, typer.Option(help="Spindle speed, rev/min, where the path has none.", show_default=False)]
-Material = Annotated[str | None, typer.Option(help="Coefficients of a material of the library.", show_default=False)]
-Ktc = Annotated[float | None, typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False)]
-Krc = Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)]
-Kac = Annotated[float | None, typer.Option(help="Axial ratio; default: the result's workpiece, or 0.", show_default=False)]
+
+
+@dataclass(frozen=True, slots=True)
+class PathCutOptions:
+    """Who cuts along a path, what, and from which stock."""
+
+    stock: Stock
+    posture: Annotated[
+        str | None,
+        typer.Option(metavar="'Q1 Q2 ...'", help="Of a robot: angles near those of the first place, degrees.", show_default=False),
+    ] = None
+    speed_rpm: Annotated[float | None, typer.Option(help="Spindle speed, rev/min, where the path has none.", show_default=False)] = None
+    material: Annotated[str | None, typer.Option(help="Coefficients of a material of the library.", show_default=False)] = None
+    ktc_mpa: Annotated[
+        float | None, typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False)
+    ] = None
+    krc: Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)] = None
+    kac: Annotated[float | None, typer.Option(help="Axial ratio; default: the result's workpiece, or 0.", show_default=False)] = None
+    cell_mm: CellMm = None
 
 
 @answers
 @takes_groups
 def stability(
     files: Files,
-    stock: Stock,
     out: Annotated[Path, typer.Option(help="STABILITY.csv to write: a row for every move that cuts.", show_default=False)],
     tip: TipOptions,
-    posture: Posture = None,
-    speed_rpm: Speed = None,
-    material: Material = None,
-    ktc_mpa: Ktc = None,
-    krc: Krc = None,
-    kac: Kac = None,
-    cell_mm: CellMm = None,
+    cut: PathCutOptions,
     step_mm: StepMm = None,
     method: Annotated[MethodName, typer.Option(help="Stability method.")] = MethodName.FULL_DISCRETISATION,
     bands: Annotated[bool, typer.Option(help="Draw machines from what is left open of this one.")] = True,
@@ -79,9 +84,9 @@ def stability(
     for written, option in ((out, "--out"), (plot, "--plot"), (plot_error, "--plot-error")):
         if written is not None:
             writable(written, option)
-    machine, tooling, path = _subjects(files, tip, posture)
-    change = _change(machine, tooling, _cut(material, ktc_mpa, krc, kac), speed_rpm, method, bands)
-    field = field_of(tooling, *stock_of(stock), metres("--cell-mm", cell_mm))
+    machine, tooling, path = _subjects(files, tip, cut.posture)
+    change = _change(machine, tooling, cut, method, bands)
+    field = field_of(tooling, *stock_of(cut.stock), metres("--cell-mm", cut.cell_mm))
     stages = Stages(quiet=json_)
     with stages.stage("removal") as line:
         removal = remove_along(tooling, path, field, metres("--step-mm", step_mm), line)
@@ -128,16 +133,9 @@ def stability(
 @takes_groups
 def mill(
     files: Files,
-    stock: Stock,
     out: Annotated[Path, typer.Option(help="FORCES.csv to write: a row for every turn of the tool in material.", show_default=False)],
     tip: TipOptions,
-    posture: Posture = None,
-    speed_rpm: Speed = None,
-    material: Material = None,
-    ktc_mpa: Ktc = None,
-    krc: Krc = None,
-    kac: Kac = None,
-    cell_mm: CellMm = None,
+    cut: PathCutOptions,
     steps: Annotated[int, typer.Option(help="Instants of a turn.", min=60, max=20000)] = 360,
     play: Annotated[bool, typer.Option("--play/--no-play", help="With the play of a robot's drives.")] = True,
     surface: Annotated[Path | None, typer.Option(help="SURFACE.csv to write: the walls that are left.", show_default=False)] = None,
@@ -152,9 +150,9 @@ def mill(
     writable(out)
     if surface is not None:
         writable(surface, "--surface")
-    machine, tooling, path = _subjects(files, tip, posture)
-    change = _change(machine, tooling, _cut(material, ktc_mpa, krc, kac), speed_rpm, MethodName.ZERO_ORDER, False)
-    field = field_of(tooling, *stock_of(stock), metres("--cell-mm", cell_mm))
+    machine, tooling, path = _subjects(files, tip, cut.posture)
+    change = _change(machine, tooling, cut, MethodName.ZERO_ORDER, False)
+    field = field_of(tooling, *stock_of(cut.stock), metres("--cell-mm", cut.cell_mm))
     stages = Stages(quiet=json_)
     with stages.stage("milling") as line:
         found = mill_path(change, path, field, steps, play, 1e-3 * positive("--cutoff-mm", cutoff_mm, "mm"), line)
@@ -194,25 +192,21 @@ def _subjects(files: list[Path], tip: TipOptions, posture: str | None) -> tuple[
     return machine, toolings[0], read_tool_path(path)
 
 
-def _cut(material: str | None, ktc_mpa: float | None, krc: float | None, kac: float | None) -> CutSpec:
-    from rcsa_ident.machining_setup import CutSpec
-
-    given = {} if ktc_mpa is None else {"tangential": ktc_mpa * 1e6}
-    given |= {} if krc is None else {"radial_ratio": krc}
-    given |= {} if kac is None else {"axial_ratio": kac}
-    return CutSpec(material=material, coefficients=given)
-
-
-def _change(machine: TipSource, tooling: Tooling, cut: CutSpec, speed_rpm: float | None, method: MethodName, bands: bool) -> ToolChange:
+def _change(machine: TipSource, tooling: Tooling, cut: PathCutOptions, method: MethodName, bands: bool) -> ToolChange:
     import numpy as np
 
+    from rcsa_ident.machining_setup import CutSpec
     from rcsa_ident.stability.lobes import DRAWS
     from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.workflows.tool_change import ToolChange
 
-    # nothing is asked of the depth: every move has its own
-    speeds = np.zeros(0) if speed_rpm is None else np.array([from_rpm(positive("--speed-rpm", speed_rpm, "rev/min"))])
-    change = ToolChange(machine, tooling, cut, speeds, 1.0, METHODS[method](), DRAWS if bands else 0)
+    given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}
+    given |= {} if cut.krc is None else {"radial_ratio": cut.krc}
+    given |= {} if cut.kac is None else {"axial_ratio": cut.kac}
+    speeds = np.zeros(0) if cut.speed_rpm is None else np.array([from_rpm(positive("--speed-rpm", cut.speed_rpm, "rev/min"))])
+    spec = CutSpec(material=cut.material, coefficients=given)
+    # every move has a depth of its own: nothing is asked about the largest one
+    change = ToolChange(machine, tooling, spec, speeds, 1.0, METHODS[method](), DRAWS if bands else 0)
     _ = change.process  # coefficients that are not known are said before anything is computed
     return change
 

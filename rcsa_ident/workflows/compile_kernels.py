@@ -52,8 +52,10 @@ from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Too
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.engagement import engagement_along
+from rcsa_ident.toolpath.march import Carrier
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.toolpath.removal import Sweep
+from rcsa_ident.toolpath.path_march import MarchOptions, mill_along
+from rcsa_ident.toolpath.removal import Sweep, made_by
 from rcsa_ident.toolpath.solid import ToolSolid
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles
@@ -176,6 +178,16 @@ def _removal() -> None:
     engagement_along(Sweep(field, solid, ToolPath(places, axes=axes)))
 
 
+def _milling_in_time() -> None:
+    """Around a bend, on springs."""
+    places = np.array([[0.0, 0.01, 0.005], [0.004, 0.01, 0.005], [0.008, 0.0101, 0.005]])
+    path = ToolPath(places, feed=np.full(3, 0.5), speed=np.full(3, 3000.0))
+    sweep = Sweep(DexelField.block(np.zeros(3), np.array([0.02, 0.02, 0.01]), 2e-3), ToolSolid.of(_CUTTER, 0.02), path)
+    springs = Carrier(np.eye(3), np.eye(3), np.full(3, 1e6), np.eye(3))
+    for part in mill_along(sweep, _CUTTER, _COEFFICIENTS, lambda move, frame: springs, MarchOptions(60, 1e-4)):
+        made_by(part.places, path, np.arange(2), 0.01, 0.01)
+
+
 def _lobes_in_time() -> None:
     process, speeds = MillingProcess(_CUTTER, _COEFFICIENTS, _CONDITIONS.engagement), np.array([900.0])
     for method in (FullDiscretisation(), TimeDomain(periods=20)):
@@ -215,6 +227,7 @@ STEPS: dict[str, Callable[[], None]] = {
     "lobes in time": _lobes_in_time,
     "robot": _robot,
     "material removal": _removal,
+    "milling in time": _milling_in_time,
     "force observer": _observer,
     "virtual machine": _virtual_machine,
 }

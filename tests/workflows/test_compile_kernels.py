@@ -20,9 +20,10 @@ def test_a_step_runs(name):
         "listening": ("signals", "sideband_scores"),
         "lobes": ("stability", "envelopes"),
         "robot": ("machine.robot", "mass_matrix"),
+        "milling in time": ("toolpath._march", "march"),
     }
     marched = [("stability._depth_kernels", kernel) for kernel in ("boundaries", "lowest", "first_of_ladder")]
     if name in called:
         room, kernel = called[name]
-        for module, entry in ((f"{room}._kernels", kernel), *(marched if name == "lobes" else ())):
+        for module, entry in ((f"{room}_kernels" if "._" in room else f"{room}._kernels", kernel), *(marched if name == "lobes" else ())):
             assert getattr(getattr(importlib.import_module(f"rcsa_ident.{module}"), entry), "signatures", True)

@@ -7,34 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from benchmarks.robot_milling import ALUMINIUM, POSTURE, SIDES, STEEL
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
-from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.io.robots import read_robot
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.toolpath.march import Carrier, Cut, March, mill_block
+from rcsa_ident.toolpath.march import Carrier, March, mill_block
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles
 from rcsa_ident.virtual.robot import arm_matrices
 from rcsa_ident.workflows.robot_milling import arm_carrier, feed_turn
 
-POSTURE = np.radians([-11.71, 20.78, 147.86, 82.76, 60.80, -166.96])
 ALONG_X = np.array([1.0, 0.0, 0.0])
-ALUMINIUM = Cut(
-    Cutter(2, 0.010, np.radians(30.0), pitch=np.radians([170.0, 190.0])),
-    CuttingCoefficients(661.553e6, 253.458 / 661.553),
-    0.0016,
-    18700.0 * 2.0 * np.pi / 60.0,
-)
-STEEL = Cut(
-    Cutter(2, 0.010, np.radians(30.0), runout=np.array([0.0, 6.929e-6])),
-    CuttingCoefficients(3333e6, 2289.0 / 3333.0),
-    0.0016,
-    3100.0 * 2.0 * np.pi / 60.0,
-)
-#: Four of ten millimetres, below the path: down-milling.
-SIDES = (-np.inf, -0.001)
 
 
 @cache
