@@ -163,6 +163,9 @@ class PathCutAnswer(Answer):
     kind: Literal["removal", "stability", "milling"]
     machine: str
     tooling: str
+    status: Literal["stable", "chatter", "no cut", "lost", "not converged"] | None = Field(
+        description="null: nothing was asked of a machine."
+    )
     sentences: list[str]
     warnings: list[str]
     removed_volume_mm3: float

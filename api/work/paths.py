@@ -244,7 +244,7 @@ def _judged(
     """What each move takes out and, on a machine, how far it is from chatter."""
     removal = remove_along(tool, path, field, request.step, lambda done, total: told("removal", done, total))
     way, volume = removal.path, 1e9 * removal.engagement.volume
-    warnings = list(removal.warnings)
+    warnings, status = list(removal.warnings), None
     if machine is None:
         moves = np.flatnonzero(volume > 1e-6)
         depth = 1e3 * np.maximum(removal.engagement.extent[:, 1] - np.maximum(removal.engagement.extent[:, 0], 0.0), 0.0)
@@ -263,17 +263,13 @@ def _judged(
         columns = stability_columns(found, way, moves)
         worst, table = found.margin_low[moves], columns_text(columns)
         sentences = _said(described(found, way))
+        status = "no cut" if not moves.size else "chatter" if float(worst.min()) < 1.0 else "stable"
         warnings += [*tool.remarks, *stands.remarks, *found.warnings]
     columns |= {"removed_volume_mm3": volume[moves], "way_mm": _way(way)[moves], "length_mm": 1e3 * way.lengths[moves]}
-    shown, kept = _thinned(columns, worst)
-    part = _part(field, way, moves[kept], solid_of(tool).radius)
-    return {
-        "sentences": sentences,
-        "warnings": list(dict.fromkeys(warnings)),
-        "rows": int(moves.size),
-        "columns": shown,
-        "part": part,
-    }, table
+    shown, row = _thinned(columns, worst)
+    part = _part(field, way, moves, row, solid_of(tool).radius)
+    said = {"status": status, "sentences": sentences, "warnings": list(dict.fromkeys(warnings))}
+    return said | {"rows": int(moves.size), "columns": shown, "part": part}, table
 
 
 def _milled(change: ToolChange, path: ToolPath, field: DexelField, request: PathRequest, told: Told) -> tuple[dict[str, Any], str]:
@@ -283,26 +279,18 @@ def _milled(change: ToolChange, path: ToolPath, field: DexelField, request: Path
     )
     columns = milling_columns(found, path)
     table = columns_text(columns)
-    begins = 1e3 * np.concatenate([[0.0], np.cumsum(path.lengths)])[found.move]
-    along = begins + 1e3 * np.linalg.norm(found.places - path.places[found.move], axis=1)
-    columns |= {
-        "way_mm": along,
-        "length_mm": np.diff(along, prepend=along[:1]),
-        "form_error_um": _wall_errors(found, len(path) - 1)[found.move],
-    }
-    shown, kept = _thinned(columns, -found.peak_force)
-    # a move for each turn: from where the one before has ended
-    turns = ToolPath(np.concatenate([found.places[:1], found.places])) if found.time.size else path
-    part = _part(field, turns, kept, solid_of(change.tooling).radius)
+    # each turn goes on from where the one before it on its move has ended
+    goes_on = np.diff(found.move, prepend=-1) == 0
+    begins = np.where(goes_on[:, None], np.roll(found.places, 1, axis=0), found.places)
+    along = np.concatenate([[0.0], np.cumsum(path.lengths)])[found.move] + np.linalg.norm(found.places - path.places[found.move], axis=1)
+    columns |= {"way_mm": 1e3 * along, "length_mm": 1e3 * np.linalg.norm(found.places - begins, axis=1)}
+    columns |= {"form_error_um": _wall_errors(found, len(path) - 1)[found.move]}
+    shown, row = _thinned(columns, -found.peak_force)
+    turns = ToolPath(np.stack([begins, found.places], axis=1).reshape(-1, 3)) if found.time.size else path
+    part = _part(field, turns, 2 * np.arange(found.time.size), row, solid_of(change.tooling).radius)
     warnings = [*found.warnings, *change.tooling.remarks, *change.machine.remarks]
-    sentences = _said(found.described(path))
-    return {
-        "sentences": sentences,
-        "warnings": list(dict.fromkeys(warnings)),
-        "rows": int(found.time.size),
-        "columns": shown,
-        "part": part,
-    }, table
+    said = {"status": found.status, "sentences": _said(found.described(path)), "warnings": list(dict.fromkeys(warnings))}
+    return said | {"rows": int(found.time.size), "columns": shown, "part": part}, table
 
 
 def _wall_errors(found: PathMilling, moves: int) -> FloatArray:
@@ -322,26 +310,30 @@ def _said(text: str) -> list[str]:
 
 
 def _thinned(columns: dict[str, FloatArray], worst: FloatArray) -> tuple[dict[str, list[float | None]], np.ndarray]:
-    """Columns of at most `MOST_ROWS` rows, and which these are: of neighbours the one whose `worst` is least."""
+    """Columns of at most `MOST_ROWS` rows, of neighbours the one whose `worst` is least; and which of these each row is told by."""
     count = worst.size
     groups = np.array_split(np.arange(count), min(count, MOST_ROWS)) if count else []
     kept = np.array([own[np.argmin(worst[own])] for own in groups], dtype=int)
-    return {name: _or_none(values[kept]) for name, values in columns.items()}, kept
+    row = np.repeat(np.arange(len(groups)), [own.size for own in groups])
+    return {name: _or_none(values[kept]) for name, values in columns.items()}, row
 
 
 def _or_none(values: FloatArray) -> list[float | None]:
     return [float(f"{each:.6g}") if isfinite(each) else None for each in values.tolist()]
 
 
-def _part(field: DexelField, path: ToolPath, moves: np.ndarray, radius: float) -> dict[str, Any] | None:
-    """The surface that is left, each triangle with the row whose move made it, -1 where none did; None where nothing is left."""
+def _part(field: DexelField, path: ToolPath, moves: np.ndarray, row: np.ndarray, radius: float) -> dict[str, Any] | None:
+    """The surface that is left, each triangle with the `row` of the one of some moves that made it, -1 where none did.
+
+    None where nothing is left.
+    """
     points, faces = field.mesh(MOST_TRIANGLES)
     if not len(faces):
         return None
     size = float(np.median(np.linalg.norm(points[faces[:, 1]] - points[faces[:, 0]], axis=1)))
     near = 1.5 * max(size, float(field.cell.max()))
     made = made_by(points[faces].mean(axis=1), path, moves, radius, near) if moves.size else np.full(len(faces), -1)
-    rows = np.where(made >= 0, np.searchsorted(moves, made), -1)
+    rows = np.where(made >= 0, np.append(row, -1)[np.searchsorted(moves, made)], -1)
     return {"points_mm": (1e3 * points).round(_DRAWN).ravel().tolist(), "triangles": faces.ravel().tolist(), "rows": rows.tolist()}
 
 

@@ -129,6 +129,7 @@ def test_stability_is_what_the_command_writes(shop, store, tmp_path, program):
     slot = np.array(answer.columns["line"]) == 4
     np.testing.assert_allclose(np.array(answer.columns["depth_mm"], dtype=float)[slot], 2.0, atol=0.02)
     assert answer.sentences[0].endswith(".")
+    assert answer.status == ("chatter" if min(answer.columns["margin_low"]) < 1.0 else "stable")
     stages = [data["progress"]["stage"] for kind, data in client.events(job.id, "paths") if data.get("progress")]
     assert stages[-1] == "stability"
 
@@ -152,7 +153,7 @@ def test_on_a_robot_it_is_cut_too(client, store, tmp_path, program):
 def test_milling_is_told_turn_by_turn(shop, store, tmp_path, program):
     client, id = shop
     program.write_text("G21 G90 S8000 M3\nG0 X-7 Y20 Z-1\nG1 X8 F1920\n")
-    job = client.cut_path("milling", program, "T1", id, block_mm=[0.0, 0.0, -4.0, 12.0, 24.0, 0.0], cell_mm=0.5, turn_steps=120, **MATERIAL)
+    job = client.cut_path("milling", program, "T1", id, block_mm=[0.0, 0.0, -4.0, 12.0, 24.0, 0.0], cell_mm=0.5, turn_steps=720, **MATERIAL)
     carried(store, tmp_path)
     found = client.path_job(job.id)
     assert found.job.state == "done", found.job.problem
@@ -164,6 +165,10 @@ def test_milling_is_told_turn_by_turn(shop, store, tmp_path, program):
     np.testing.assert_allclose(way, x + 7.0, atol=1e-3)
     assert max(answer.part.rows) >= 0
     assert max(answer.columns["peak_force_n"]) > 50.0
+    assert answer.status in ("stable", "chatter")
+    # each turn begins where the one before it has ended
+    np.testing.assert_allclose(np.array(answer.columns["length_mm"])[1:], np.diff(way), atol=1e-3)
+    assert answer.columns["length_mm"][0] == 0.0
 
 
 def test_a_stock_may_be_a_surface(client, store, tmp_path, program):
@@ -252,6 +257,8 @@ def test_many_rows_are_thinned_to_the_worst(monkeypatch, shop, store, tmp_path, 
     assert len(thin.columns["margin"]) == 7
     assert min(thin.columns["margin_low"]) == min(whole.columns["margin_low"])
     assert max(thin.part.rows) <= 6
+    # what neighbours made is told by the row that is left of them
+    assert [each >= 0 for each in thin.part.rows] == [each >= 0 for each in whole.part.rows]
 
 
 def test_a_repeated_request_begins_one_job(client, program):

@@ -8,6 +8,8 @@ import { factor, plain, text, unit } from "./units.js";
 /** Pixels of the picture, at most: a fine screen gets larger ones. */
 const MOST_PIXELS = 900_000;
 const MARGIN = 34;
+/** What is drawn of the tool, and what of it has room above the part, in diameters. */
+const [LONG, ABOVE] = [2, 1];
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const plus = (a, b, times = 1) => a.map((v, k) => v + times * b[k]);
@@ -98,11 +100,13 @@ export function partPicture() {
     canvas.dataset.view = `${Math.round(azimuth)} ${Math.round(elevation)}`;
   }
 
-  /** As large as the part lets it be, as it is seen now; a tool that stands above it may be cut off. */
+  /** As large as the part lets it be, as it is seen now, with some room for the tool above it. */
   function fitted(view, width, height, fine) {
     const around = [];
     const box = surface ?? { low: lowOf(shown.path.places_mm), high: highOf(shown.path.places_mm) };
     for (let k = 0; k < 8; k += 1) around.push([0, 1, 2].map((i) => ((k >> i) & 1 ? box.high[i] : box.low[i])));
+    const above = ABOVE * 2 * Math.max(0, ...shown.outline.map(([radius]) => radius));
+    around.push(...around.filter((p) => p[2] === box.high[2]).map(([x, y, z]) => [x, y, z + above]));
     const xs = around.map((p) => dot(view[0], p));
     const ys = around.map((p) => -dot(view[1], p));
     const [left, top, far, low] = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
@@ -141,7 +145,8 @@ export function partPicture() {
     pen.beginPath();
     for (const { at, radius } of [rings[0], rings.at(-1)]) {
       pen.moveTo(at[0] + radius * aside[0], at[1] + radius * aside[1]);
-      pen.ellipse(at[0], at[1], radius, radius * flatter, turn, 0, 2 * Math.PI);
+      // the way round that the sides go, too: all of it is filled once
+      pen.ellipse(at[0], at[1], radius, radius * flatter, turn, 0, 2 * Math.PI, true);
     }
     const side = (way) => rings.map(({ at, radius }) => [at[0] + way * radius * aside[0], at[1] + way * radius * aside[1]]);
     [...side(1), ...side(-1).reverse()].forEach((p, k) => (k ? pen.lineTo(...p) : pen.moveTo(...p)));
@@ -198,10 +203,18 @@ export function partPicture() {
     look,
     show: (next) => {
       if (next.part !== undefined && next.part !== shown.part) surface = next.part ? surfaceOf(next.part) : null;
+      if (next.outline) next = { ...next, outline: shortened(next.outline) };
       shown = { ...shown, ...next };
       redraw("part" in next || "paint" in next);
     },
   };
+}
+
+/** The lower end of a tool's outline, [radius, height] from the tip up. */
+function shortened(outline) {
+  const end = LONG * 2 * Math.max(...outline.map(([radius]) => radius));
+  const kept = outline.filter(([, height]) => height < end);
+  return kept.length < outline.length ? [...kept, [kept.at(-1)[0], end]] : outline;
 }
 
 const lowOf = (places) => [0, 1, 2].map((k) => Math.min(0, ...places.map((p) => p[k])));

@@ -109,10 +109,9 @@ export function pathAnswer(answer, id) {
 
 /** What is said of it. */
 function summary(answer) {
-  const good = answer.kind !== "stability" || !(answer.columns.margin_low ?? []).some((each) => each !== null && each < 1);
   const volume = `${plain(answer.removed_volume_mm3)} mm³ are taken out, ${plain(answer.left_volume_mm3)} mm³ are left.`;
   const sentences = answer.kind === "removal" ? [volume] : [...answer.sentences, volume];
-  const said = h("section", { class: `note ${good ? "good" : "bad"}`, "aria-label": "In short" }, sentences.map((each) => h("p", null, each)));
+  const said = h("section", { class: `note ${{ stable: "good", "no cut": "doubt" }[answer.status] ?? (answer.status ? "bad" : "good")}`, "aria-label": "In short" }, sentences.map((each) => h("p", null, each)));
   if (!answer.warnings.length) return said;
   const doubts = answer.warnings.map((each) => h("li", null, each));
   return h("div", { class: "view" }, said, note("doubt", doubts.length === 1 ? answer.warnings[0] : h("details", { open: doubts.length < 4 }, h("summary", null, `${doubts.length} warnings`), h("ul", null, doubts))));
@@ -133,7 +132,8 @@ function worstCard(answer, onshow) {
   const rows = worstRows(answer).slice(0, WORST);
   if (!rows.length) return null;
   const { columns } = answer;
-  const shown = NUMBERS.filter(([name]) => name in columns && !["deflection_um", "limit_depth_mm"].includes(name));
+  const aside = answer.kind === "removal" ? [] : ["deflection_um", "limit_depth_mm", "removed_volume_mm3"];
+  const shown = NUMBERS.filter(([name]) => name in columns && !aside.includes(name));
   const units = { depth_mm: "depth", chatter_frequency_hz: "hertz", peak_force_n: "force", swing_um: "displacement", form_error_um: "displacement" };
   const bare = (name, value, k) => {
     if (name in units) return value === null ? "–" : q(units[name], value, { bare: true });
