@@ -7,14 +7,13 @@ import json
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from api.work import tasks
+from api.work.path_answers import drawn_path, outline_of, part_of, sentences_of, thinned, wall_errors, way_along
 from api.work.requests import MachineText, ToolingSource
 from api.work.robots import is_posed, posed
 from api.work.toolings import tooling_from, weigh
@@ -32,9 +31,8 @@ from rcsa_ident.stability.methods import method_named
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.toolpath.dexel import DexelField, memory_of
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.toolpath.removal import made_by
 from rcsa_ident.units import to_hz
-from rcsa_ident.workflows.path_milling import PathMilling, mill_path
+from rcsa_ident.workflows.path_milling import mill_path
 from rcsa_ident.workflows.path_removal import STEP, default_cell, field_of, remove_along, solid_of
 from rcsa_ident.workflows.path_stability import cuts_along, described, stations_along
 from rcsa_ident.workflows.tool_change import ToolChange
@@ -43,10 +41,6 @@ from rcsa_ident.workflows.tool_change import ToolChange
 LARGEST_PATH, LARGEST_STOCK = 4_000_000, 8_000_000
 #: Places of a path after it is cut up, bytes of the stock's lines, meetings of places and lines, and instants of milling in time.
 MOST_PLACES, MOST_MEMORY, MOST_MEETINGS, MOST_INSTANTS = 200_000, 4e8, 2e9, 2e8
-#: Rows, places of the line that is drawn, triangles of the part, and points of the tool's outline that an answer has at most.
-MOST_ROWS, MOST_DRAWN, MOST_TRIANGLES, MOST_OUTLINE = 10_000, 10_000, 60_000, 60
-#: How exact places are drawn [mm], and the outline of a tool [m].
-_DRAWN, _CHORD = 3, 1e-5
 
 #: Told the stage, how much of it is done, and of how much.
 Told = Callable[[str, int, int], None]
@@ -142,7 +136,7 @@ def preview(file: str, text: str) -> dict[str, Any]:
         "high_mm": (1e3 * high).tolist(),
         "spindle_speed_told": not bool(np.any(still)),
         "warnings": warnings,
-    } | {"path": _drawn_path(path)}
+    } | {"path": drawn_path(path)}
 
 
 def weighed(machine: MachineText | None, tooling: ToolingSource, request: PathRequest) -> None:
@@ -224,16 +218,14 @@ def cut(machine: MachineText | None, tooling: ToolingSource, request: PathReques
         answer, table = _milled(request.change(_machine(machine, False), tool), path, field, request, told)
     else:
         answer, table = _judged(machine, tool, path, field, request, told)
-    outline = solid_of(tool).coarser(_CHORD)
-    every = max(1, len(outline.heights) // MOST_OUTLINE)
     answer |= {
         "kind": request.kind,
         "tooling": tooling.name,
         "removed_volume_mm3": 1e9 * (before - field.volume),
         "left_volume_mm3": 1e9 * field.volume,
         "cell_mm": 1e3 * float(field.cell.max()),
-        "path": _drawn_path(path),
-        "tool_outline_mm": _rounded(1e3 * np.column_stack([outline.radii, outline.heights])[::every]),
+        "path": drawn_path(path),
+        "tool_outline_mm": outline_of(solid_of(tool)),
     }
     return {"answer": json.dumps(answer, allow_nan=False), "table": table}
 
@@ -262,12 +254,12 @@ def _judged(
         moves = np.flatnonzero(found.cutting)
         columns = stability_columns(found, way, moves)
         worst, table = found.margin_low[moves], columns_text(columns)
-        sentences = _said(described(found, way))
+        sentences = sentences_of(described(found, way))
         status = "no cut" if not moves.size else "chatter" if float(worst.min()) < 1.0 else "stable"
         warnings += [*tool.remarks, *stands.remarks, *found.warnings]
-    columns |= {"removed_volume_mm3": volume[moves], "way_mm": _way(way)[moves], "length_mm": 1e3 * way.lengths[moves]}
-    shown, row = _thinned(columns, worst)
-    part = _part(field, way, moves, row, solid_of(tool).radius)
+    columns |= {"removed_volume_mm3": volume[moves], "way_mm": way_along(way)[moves], "length_mm": 1e3 * way.lengths[moves]}
+    shown, row = thinned(columns, worst)
+    part = part_of(field, way, moves, row, solid_of(tool).radius)
     said = {"status": status, "sentences": sentences, "warnings": list(dict.fromkeys(warnings))}
     return said | {"rows": int(moves.size), "columns": shown, "part": part}, table
 
@@ -284,73 +276,10 @@ def _milled(change: ToolChange, path: ToolPath, field: DexelField, request: Path
     begins = np.where(goes_on[:, None], np.roll(found.places, 1, axis=0), found.places)
     along = np.concatenate([[0.0], np.cumsum(path.lengths)])[found.move] + np.linalg.norm(found.places - path.places[found.move], axis=1)
     columns |= {"way_mm": 1e3 * along, "length_mm": 1e3 * np.linalg.norm(found.places - begins, axis=1)}
-    columns |= {"form_error_um": _wall_errors(found, len(path) - 1)[found.move]}
-    shown, row = _thinned(columns, -found.peak_force)
+    columns |= {"form_error_um": wall_errors(found, len(path) - 1)[found.move]}
+    shown, row = thinned(columns, -found.peak_force)
     turns = ToolPath(np.stack([begins, found.places], axis=1).reshape(-1, 3)) if found.time.size else path
-    part = _part(field, turns, 2 * np.arange(found.time.size), row, solid_of(change.tooling).radius)
+    part = part_of(field, turns, 2 * np.arange(found.time.size), row, solid_of(change.tooling).radius)
     warnings = [*found.warnings, *change.tooling.remarks, *change.machine.remarks]
-    said = {"status": found.status, "sentences": _said(found.described(path)), "warnings": list(dict.fromkeys(warnings))}
+    said = {"status": found.status, "sentences": sentences_of(found.described(path)), "warnings": list(dict.fromkeys(warnings))}
     return said | {"rows": int(found.time.size), "columns": shown, "part": part}, table
-
-
-def _wall_errors(found: PathMilling, moves: int) -> FloatArray:
-    """Mean error of the walls that each move leaves, shape (moves,) [µm]; nan where it leaves none."""
-    of = found.surface[:, 5].astype(int)
-    count = np.bincount(of, minlength=moves)
-    return np.divide(1e6 * np.bincount(of, found.surface[:, 4], minlength=moves), count, out=np.full(moves, np.nan), where=count > 0)
-
-
-def _way(path: ToolPath) -> FloatArray:
-    """Way up to the end of each move, shape (k - 1,) [mm]."""
-    return 1e3 * np.cumsum(path.lengths)
-
-
-def _said(text: str) -> list[str]:
-    return [f"{line[:1].upper()}{line[1:]}." for line in text.splitlines()]
-
-
-def _thinned(columns: dict[str, FloatArray], worst: FloatArray) -> tuple[dict[str, list[float | None]], np.ndarray]:
-    """Columns of at most `MOST_ROWS` rows, of neighbours the one whose `worst` is least; and which of these each row is told by."""
-    count = worst.size
-    groups = np.array_split(np.arange(count), min(count, MOST_ROWS)) if count else []
-    kept = np.array([own[np.argmin(worst[own])] for own in groups], dtype=int)
-    row = np.repeat(np.arange(len(groups)), [own.size for own in groups])
-    return {name: _or_none(values[kept]) for name, values in columns.items()}, row
-
-
-def _or_none(values: FloatArray) -> list[float | None]:
-    return [float(f"{each:.6g}") if isfinite(each) else None for each in values.tolist()]
-
-
-def _part(field: DexelField, path: ToolPath, moves: np.ndarray, row: np.ndarray, radius: float) -> dict[str, Any] | None:
-    """The surface that is left, each triangle with the `row` of the one of some moves that made it, -1 where none did.
-
-    None where nothing is left.
-    """
-    points, faces = field.mesh(MOST_TRIANGLES)
-    if not len(faces):
-        return None
-    size = float(np.median(np.linalg.norm(points[faces[:, 1]] - points[faces[:, 0]], axis=1)))
-    near = 1.5 * max(size, float(field.cell.max()))
-    made = made_by(points[faces].mean(axis=1), path, moves, radius, near) if moves.size else np.full(len(faces), -1)
-    rows = np.where(made >= 0, np.append(row, -1)[np.searchsorted(moves, made)], -1)
-    return {"points_mm": (1e3 * points).round(_DRAWN).ravel().tolist(), "triangles": faces.ravel().tolist(), "rows": rows.tolist()}
-
-
-def _drawn_path(path: ToolPath) -> dict[str, Any]:
-    """The line that is drawn, with what it is told by: of many places every so many, and the last one."""
-    every = max(1, -(-len(path) // MOST_DRAWN))
-    kept = np.unique(np.append(np.arange(0, len(path), every), len(path) - 1))
-    way = np.concatenate([[0.0], _way(path)])[kept]
-    return {
-        "places_mm": _rounded(1e3 * path.places[kept]),
-        "axes": _rounded(path.axes[kept]),
-        "way_mm": way.round(_DRAWN).tolist(),
-        "line": path.line[kept].tolist(),
-        "rapid": [False, *(bool(np.all(~path.cutting[a:b])) for a, b in pairwise(kept))],
-    }
-
-
-def _rounded(values: FloatArray) -> list[list[float]]:
-    found: list[list[float]] = (values.round(_DRAWN) + 0.0).tolist()
-    return found

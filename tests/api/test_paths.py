@@ -12,6 +12,7 @@ import pytest
 from api.jobs import job_context
 from api.jobs.worker import carry
 from api.schemas.paths import PathMillingQuery, PathStabilityQuery, RemovalQuery
+from api.work import path_answers
 from api.work import paths as work
 from rcsa_ident.io.meshes import write_mesh
 from rcsa_ident.io.robots import robot_keys
@@ -94,7 +95,7 @@ def test_what_is_taken_out_is_told_and_drawn(client, store, tmp_path, program):
     assert answer.path.way_mm[-1] == pytest.approx(client.path_told(program).length_mm, abs=1e-3)
     # each triangle of a floor belongs to the move that made it
     points, faces = (np.array(each).reshape(-1, 3) for each in (answer.part.points_mm, answer.part.triangles))
-    assert 0 < len(faces) == len(answer.part.rows) <= work.MOST_TRIANGLES
+    assert 0 < len(faces) == len(answer.part.rows) <= path_answers.MOST_TRIANGLES
     middle, rows = points[faces].mean(axis=1), np.array(answer.part.rows)
     lines = np.where(rows >= 0, np.array(answer.columns["line"])[rows], 0.0)
     inside = (middle[:, 0] > 2.0) & (middle[:, 0] < 28.0)
@@ -250,7 +251,7 @@ def test_many_rows_are_thinned_to_the_worst(monkeypatch, shop, store, tmp_path, 
     jobs = [client.cut_path("stability", program, "T1", id, **QUICK) for _ in range(2)]
     first, second = store.jobs.open()
     carry(store.jobs, carriers(store, tmp_path), "here", 3, first.id, lambda name, compute: compute())
-    monkeypatch.setattr(work, "MOST_ROWS", 7)
+    monkeypatch.setattr(path_answers, "MOST_ROWS", 7)
     carry(store.jobs, carriers(store, tmp_path), "here", 3, second.id, lambda name, compute: compute())
     whole, thin = (client.path_job(each.id).answer for each in jobs)
     assert len(whole.columns["margin"]) == whole.rows == thin.rows > 7
