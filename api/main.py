@@ -39,6 +39,7 @@ from api.routes import (
     machines,
     materials,
     multi_upload,
+    paths,
     recordings,
     resumable_upload,
     ringing,
@@ -56,6 +57,7 @@ from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
 from api.schemas.forces import ForceQuery, ForceUpload
 from api.schemas.jobs import PartialLobes
+from api.schemas.paths import PathMillingQuery, PathStabilityQuery, RemovalQuery
 from api.schemas.ringing import RingQuery
 from api.security import HEADER, WRONG_KEYS
 from api.settings import Settings
@@ -145,6 +147,7 @@ def create_app(
         machines,
         toolings,
         robots,
+        paths,
         versions,
         libraries,
         dropped_files,
@@ -174,7 +177,8 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
         schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         components = schema.setdefault("components", {})
         # bodies that routes parse themselves, what streams of events tell, and the error answer of all routes
-        for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload, PartialLobes, RingQuery):
+        path_queries = (RemovalQuery, PathStabilityQuery, PathMillingQuery)
+        for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload, PartialLobes, RingQuery, *path_queries):
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             components.setdefault("schemas", {}).update(described.pop("$defs", {}))
             components["schemas"][model.__name__] = described

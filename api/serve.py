@@ -94,6 +94,9 @@ def worker(
         int | None, typer.Option(min=0, max=256, help="Processes for identifications (RCSA_IDENT_JOB_WORKERS).", show_default=False)
     ] = None,
     lobes: Annotated[int | None, typer.Option(min=0, max=256, help="For lobes (RCSA_IDENT_LOBE_WORKERS).", show_default=False)] = None,
+    paths: Annotated[
+        int | None, typer.Option(min=0, max=256, help="For tools along paths (RCSA_IDENT_PATH_WORKERS).", show_default=False)
+    ] = None,
 ) -> None:
     """Run job workers for a service that runs elsewhere, with the same database and the same folder for recordings."""
     import signal
@@ -105,7 +108,8 @@ def worker(
     settings = context.obj
     log_lines.start()
     # a service whose jobs run elsewhere names none for itself
-    crew = _crew(max(settings.job_workers, 1) if count is None else count, max(settings.lobe_workers, 1) if lobes is None else lobes)
+    named = ((count, settings.job_workers), (lobes, settings.lobe_workers), (paths, settings.path_workers))
+    crew = _crew(*(max(usual, 1) if given is None else given for given, usual in named))
     supervisor = Supervisor(crew, settings, settings.job_nice)
     ended = threading.Event()
     for each in (signal.SIGTERM, signal.SIGINT):
@@ -154,15 +158,16 @@ def restore_store(
     typer.echo(f"{data}: {account.files} files, {account.bytes / 1e6:.1f} MB")
 
 
-def _crew(identifications: int, lobes: int) -> list[Callable[[Any, Callable[[], None], Event], None]]:
+def _crew(identifications: int, lobes: int, paths: int) -> list[Callable[[Any, Callable[[], None], Event], None]]:
     """What each job worker does: each kind of jobs has its own, so that a short one never waits behind a long one of the other."""
-    return [*[partial(job_worker, "identification")] * identifications, *[partial(job_worker, "lobes")] * lobes]
+    counts = {"identification": identifications, "lobes": lobes, "path": paths}
+    return [partial(job_worker, kind) for kind, count in counts.items() for _ in range(count)]
 
 
 def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event) -> None:
     """Carry out jobs of a kind until `stop` is set."""
     from api.files import Files
-    from api.jobs import identification, lobes
+    from api.jobs import identification, lobes, paths
     from api.jobs.cluster import over_cluster
     from api.jobs.durable import Durable
     from api.jobs.worker import Carrier, JobWorker
@@ -172,7 +177,11 @@ def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event)
     store = open_store(settings.database_url)
     load = partial(load_campaign, store, Files(settings.data / "files", settings.group_bytes, settings.free_bytes))
     spread = over_cluster(settings.dask) if settings.dask else map
-    carriers: dict[str, Carrier] = {"identification": partial(identification.carry, load, spread=spread), "lobes": lobes.carry}
+    carriers: dict[str, Carrier] = {
+        "identification": partial(identification.carry, load, spread=spread),
+        "lobes": lobes.carry,
+        "path": paths.carry,
+    }
     JobWorker(store.jobs, Durable(settings.engine_url), {kind: carriers[kind]}, settings.job_attempts).run(ready, stop)
 
 
@@ -192,7 +201,7 @@ def _run(settings: object) -> None:
             certificate = None
             if settings.tls_certificate is not None and settings.tls_key is not None:
                 certificate = Certificate(settings.tls_certificate, settings.tls_key)
-            crew = _crew(settings.job_workers, settings.lobe_workers)
+            crew = _crew(settings.job_workers, settings.lobe_workers, settings.path_workers)
             service = create_app(settings, supervisor=Supervisor(crew, settings, settings.job_nice))
         except InputError as error:
             _fail(error)

@@ -123,7 +123,8 @@ class Settings(BaseSettings):
         description="processes for identifications; 0 where `rcsa-ident-serve worker` runs them elsewhere. Each takes about 300 MB (of "
         "which 110 MB are shared with the others) and at most one core",
     )
-    lobe_workers: int = Field(1, ge=0, le=256, description="the same for lobes as jobs; the two kinds never wait for each other")
+    lobe_workers: int = Field(1, ge=0, le=256, description="the same for lobes as jobs; kinds never wait for each other")
+    path_workers: int = Field(1, ge=0, le=256, description="the same for tools along paths")
     job_nice: int = Field(10, ge=0, le=19, description="how far processes for jobs stand behind queries and streams, as `nice`")
     job_queue: int = Field(50, ge=1, le=10**6, description="jobs of a group that may wait or run")
     job_attempts: int = Field(

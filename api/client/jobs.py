@@ -1,4 +1,4 @@
-"""Jobs of the client: identifications, and lobes that take long."""
+"""Jobs of the client: identifications, lobes that take long, tools along paths."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import json
 import math
 import time
 from collections.abc import Iterable, Iterator
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import httpx2
 
@@ -14,6 +15,7 @@ from api.client.asking import Asking, Json, ServiceError, read, refused, standin
 from api.schemas.common import Page, ProblemDocument
 from api.schemas.jobs import FittedLines, JobAnswer, LobeJob
 from api.schemas.machines import Modes
+from api.schemas.paths import PathJob, PathTold
 from api.schemas.queries import LobeAnswer
 
 
@@ -49,7 +51,7 @@ class Jobs(Asking):
         Parameters
         ----------
         kind : str
-            identifications or lobes.
+            identifications, lobes or paths.
         attempts : int
             Successive connections without an event.
         """
@@ -115,6 +117,38 @@ class Jobs(Asking):
     def lobe_job(self, id: str, wait: int = 0) -> LobeJob:
         """Return a job of lobes, once it has ended or after so many seconds."""
         return read(LobeJob, self.send("GET", f"/lobes/{id}", headers={"Prefer": f"wait={wait}"} if wait else {}))
+
+    def path_told(self, path: Path) -> PathTold:
+        """Return what PATH.nc or PATH.csv is; nothing is stored."""
+        kind = "text/csv" if path.suffix.lower() == ".csv" else "text/x-gcode"
+        return read(PathTold, self.send("POST", "/paths/preview", content=path.read_bytes(), headers={"Content-Type": kind}))
+
+    def cut_path(
+        self,
+        kind: Literal["removal", "stability", "milling"],
+        path: Path,
+        tooling: str | Json,
+        machine: str | Json | None = None,
+        stock: Path | None = None,
+        **further: Any,
+    ) -> JobAnswer:
+        """Submit a tool along a path through stock: ``block_mm``, or the file of its surface; a removal needs no machine."""
+        query = {"tooling": tooling, **({} if machine is None else standing_on(machine)), **further}
+        files = {"query": (None, json.dumps(query), "application/json"), "path": (path.name, path.read_bytes())}
+        files |= {} if stock is None else {"stock": (stock.name, stock.read_bytes())}
+        return read(JobAnswer, self.send("POST", f"/paths/{kind}", files=files))
+
+    def path_job(self, id: str, wait: int = 0) -> PathJob:
+        """Return a job of a path, once it has ended or after so many seconds."""
+        return read(PathJob, self.send("GET", f"/paths/{id}", headers={"Prefer": f"wait={wait}"} if wait else {}))
+
+    def path_table(self, id: str) -> str:
+        """Return the table of a job of a path, as the command writes it."""
+        return self.send("GET", f"/paths/{id}/table").text
+
+    def cancel_path(self, id: str) -> JobAnswer:
+        """Cancel a job of a path."""
+        return read(JobAnswer, self.send("DELETE", f"/paths/{id}"))
 
 
 def _events(lines: Iterable[str]) -> Iterator[dict[str, str]]:

@@ -42,6 +42,7 @@ NOUNS = (
     "rcsa_ident.machining_setup.CutSpec",
     "api.work.requests.ToolingSource",
     "api.work.requests.LobeRequest",
+    "api.work.paths.PathRequest",
 )
 _PLACES = {place.rpartition(".")[2]: place for place in NOUNS}
 

@@ -33,6 +33,8 @@ REOPEN = 2000
 LOOK = 3.0
 #: Longest wait of a request for the end of a job [s].
 LONGEST_WAIT = 30.0
+#: Where jobs of each kind are.
+_PLACES = {"identification": "identifications", "lobes": "lobes", "path": "paths"}
 JobId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a job.")]
 Prefer = Annotated[
     str | None, Header(max_length=200, description="`wait=N`: answer when the job has ended, after N s (at most 30) at the latest.")
@@ -91,7 +93,7 @@ def _answer(job: Job, queue: tuple[int, int] | None) -> JobAnswer:
 
 def place(job: Job) -> str:
     """Return the path of a job."""
-    return f"/v1/{'lobes' if job.kind == 'lobes' else 'identifications'}/{job.id}"
+    return f"/v1/{_PLACES[job.kind]}/{job.id}"
 
 
 def accepted(components: Components, job: Job) -> JSONResponse:

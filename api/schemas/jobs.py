@@ -52,7 +52,7 @@ class JobAnswer(Answer):
     """A job."""
 
     id: str
-    kind: Literal["identification", "lobes"]
+    kind: Literal["identification", "lobes", "path"]
     machine: str = Field(description="Its id; empty where a robot is asked.")
     campaign: str | None
     state: JobState

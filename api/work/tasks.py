@@ -40,6 +40,11 @@ def keep(machines: int) -> None:
     _machines.most = machines
 
 
+def known(machine: MachineText, spread: bool) -> Machine:
+    """Return a machine, read if this worker does not know it."""
+    return _machines.get(machine, spread)
+
+
 def check(text: str) -> dict[str, Any]:
     """Return what a result or a flange says in short, after everything in it has been checked."""
     if is_result(text):

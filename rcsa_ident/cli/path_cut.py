@@ -16,7 +16,7 @@ from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
 from rcsa_ident.cli.robot import is_robot, posed_robot
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.units import from_rpm, to_hz, to_rpm
+from rcsa_ident.units import from_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import TipSource
@@ -77,7 +77,7 @@ def stability(
     """Tell on every move of a path how far the cut is from chatter, its force, how the tip moves, and where it leaves the wall."""
     import numpy as np
 
-    from rcsa_ident.io.path_tables import place_columns, write_columns
+    from rcsa_ident.io.path_tables import stability_columns, write_columns
     from rcsa_ident.workflows.path_removal import field_of, remove_along
     from rcsa_ident.workflows.path_stability import cuts_along, described, stations_along
 
@@ -93,25 +93,7 @@ def stability(
     with stages.stage("stability") as line:
         found = cuts_along(change, removal.path, removal.engagement, stations_along(machine, tooling, removal.path), line)
     way, cutting = removal.path, np.flatnonzero(found.cutting)
-    force = _machine_axes(found, way)
-    columns = place_columns(way.places[1:][cutting])
-    columns |= {
-        "line": way.line[1:][cutting],
-        "depth_mm": 1e3 * found.depth[cutting],
-        "spindle_speed_rpm": to_rpm(found.speed[cutting], 9),
-        "feed_per_tooth_mm": 1e3 * found.feed_per_tooth[cutting],
-        "margin": found.margin[cutting],
-        "margin_low": found.margin_low[cutting],
-        "limit_depth_mm": 1e3 * found.limit[cutting],
-        "chatter_frequency_hz": to_hz(found.chatter_frequency[cutting]),
-        "force_x_n": force[cutting, 0],
-        "force_y_n": force[cutting, 1],
-        "force_z_n": force[cutting, 2],
-        "peak_force_n": found.peak_force[cutting],
-        "deflection_um": 1e6 * found.deflection[cutting],
-        "form_error_um": 1e6 * found.form_error[cutting],
-    }
-    write_columns(out, columns)
+    write_columns(out, stability_columns(found, way, cutting))
     _plots(removal, tooling, found, plot, plot_error)
     warnings = [*removal.warnings, *tooling.remarks, *machine.remarks, *found.warnings]
     if json_:
@@ -143,7 +125,7 @@ def mill(
     json_: Json = False,
 ) -> None:
     """Mill along a path in time: chips, forces and vibrations instant by instant, and the walls that they leave."""
-    from rcsa_ident.io.path_tables import place_columns, write_columns
+    from rcsa_ident.io.path_tables import milling_columns, write_columns
     from rcsa_ident.workflows.path_milling import mill_path
     from rcsa_ident.workflows.path_removal import field_of
 
@@ -156,12 +138,7 @@ def mill(
     stages = Stages(quiet=json_)
     with stages.stage("milling") as line:
         found = mill_path(change, path, field, steps, play, 1e-3 * positive("--cutoff-mm", cutoff_mm, "mm"), line)
-    columns = {"time_s": found.time} | place_columns(found.places)
-    columns |= {f"force_{axis}_n": found.mean_force[:, k] for k, axis in enumerate("xyz")}
-    columns |= {"peak_force_n": found.peak_force}
-    columns |= {f"deflection_{axis}_um": 1e6 * found.mean_tip[:, k] for k, axis in enumerate("xyz")}
-    columns |= {"swing_um": 1e6 * found.swing, "beside_turns_um": 1e6 * found.beside_turns, "line": path.line[1:][found.move]}
-    write_columns(out, columns)
+    write_columns(out, milling_columns(found, path))
     if surface is not None:
         write_columns(surface, _surface_columns(found, path))
     if json_:
@@ -209,16 +186,6 @@ def _change(machine: TipSource, tooling: Tooling, cut: PathCutOptions, method: M
     change = ToolChange(machine, tooling, spec, speeds, 1.0, METHODS[method](), DRAWS if bands else 0)
     _ = change.process  # coefficients that are not known are said before anything is computed
     return change
-
-
-def _machine_axes(found: CutsAlong, path: ToolPath) -> Any:
-    """Mean forces of moves along X, Y and the tool's axis."""
-    import numpy as np
-
-    way = np.arctan2(path.moves[:, 1], path.moves[:, 0])
-    c, s = np.cos(way), np.sin(way)
-    x, y, z = found.mean_force.T
-    return np.column_stack([c * x - s * y, s * x + c * y, z])
 
 
 def _summary(found: CutsAlong, path: ToolPath) -> dict[str, Any]:

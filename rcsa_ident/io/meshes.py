@@ -32,7 +32,11 @@ def read_mesh(path: str | Path) -> tuple[FloatArray, np.ndarray]:
     where, kind = str(path), Path(path).suffix.lower()
     if kind not in MESHES:
         raise InputError("mesh", f"suffix '{Path(path).suffix}'", f"a file that ends in {', '.join(MESHES)}", where)
-    content = bytes(read_bytes(path, "mesh", LARGEST))
+    return mesh_of(bytes(read_bytes(path, "mesh", LARGEST)), kind, where)
+
+
+def mesh_of(content: bytes, kind: str, where: str) -> tuple[FloatArray, np.ndarray]:
+    """Return the surface of a file's content, as `read_mesh` does; `kind` is one of `MESHES`, `where` is named in the messages."""
     trimesh = _trimesh(where)
     try:
         # points that stand at one place become one, so that neighbours share their edges

@@ -183,20 +183,25 @@ class DexelField(Shown):
         last = np.maximum(count.astype(np.intp) - 1, 0)[:, :, None, None]
         return np.where(count > 0, np.take_along_axis(seg[..., 1:], last, axis=2)[:, :, 0, 0], np.nan)
 
-    def mesh(self) -> tuple[FloatArray, FloatArray]:
+    def mesh(self, most: int | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the material's surface: points, shape (v, 3) [m], and triangles, shape (f, 3), counterclockwise from outside.
 
         Dual contours [ju2002]: a point in each cell of the lattice that the surface goes through, nearest to the planes in which it
         crosses the cell's edges, so that edges stay sharp. It is closed whatever was cut, and leaves lines out where it would get too
-        large.
+        large, or have more triangles than `most`.
         """
         every = max(1, int(np.ceil((np.prod(np.array(self.shape, dtype=float)) / _DRAWN) ** (1.0 / 3.0))))
-        shape = [(n - 1) // every + 1 for n in self.shape]
-        filled = np.zeros([n + 2 for n in shape], dtype=np.bool_)
-        lattice = self.lattice
-        occupied(self.segs[2], self.counts[2], lattice[0, 2], lattice[1, 2], every, filled)
-        given = self.segs, self.counts, lattice, every, filled
-        points, triangles = surface_net(*given, np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
+        while True:
+            shape = [(n - 1) // every + 1 for n in self.shape]
+            filled = np.zeros([n + 2 for n in shape], dtype=np.bool_)
+            lattice = self.lattice
+            occupied(self.segs[2], self.counts[2], lattice[0, 2], lattice[1, 2], every, filled)
+            given = self.segs, self.counts, lattice, every, filled
+            points, triangles = surface_net(*given, np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
+            if most is None or triangles <= most or max(shape) == 1:
+                break
+            # there are as many as squares of this size on the surface
+            every = max(every + 1, int(every * np.sqrt(triangles / most)))
         vertices, faces = np.empty((points, 3)), np.empty((triangles, 3), dtype=np.int64)
         if points:
             surface_net(*given, vertices, faces)

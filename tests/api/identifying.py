@@ -11,7 +11,7 @@ from typing import Any
 
 from api.client import Client
 from api.files import Files
-from api.jobs import identification, lobes
+from api.jobs import identification, lobes, paths
 from api.jobs.worker import Carrier, carry
 from api.reading.campaigns import load_campaign
 from api.security import new_id, now
@@ -77,7 +77,7 @@ def running(store: Store, machine: str, **changed: Any) -> str:
 
 def carriers(store: Store, folder: Path) -> dict[str, Carrier]:
     load = partial(load_campaign, store, Files(folder / "files", 10**12, 0))
-    return {"identification": partial(identification.carry, load), "lobes": lobes.carry}
+    return {"identification": partial(identification.carry, load), "lobes": lobes.carry, "path": paths.carry}
 
 
 def carried(store: Store, folder: Path, steps: Steps | None = None) -> Steps:

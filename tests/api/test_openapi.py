@@ -92,7 +92,7 @@ NOTHING_TO_SAY = (
 )  # fmt: skip
 
 #: Calls that take a table, which chance does not write: all that it sends is refused.
-TABLES = ("POST /v1/tested-cuts/preview", "POST /v1/robots/path/preview")
+TABLES = ("POST /v1/tested-cuts/preview", "POST /v1/robots/path/preview", "POST /v1/paths/preview")
 #: Calls that take an arm, which chance writes no more than a table.
 ARMS = ("PUT /v1/robots/{name}",)
 
@@ -161,8 +161,12 @@ def jobs(http, store, folder, machine, campaign, result) -> dict[str, dict[str, 
     store.jobs.finish(id, "w", Outcome("done", now(), 1.0, "suspect", None, texts))
     query = {"machine": machine, "toolings": [example()], "speeds": {"step_rpm": 2000}}
     lobes = http.post("/v1/lobes", json=query, headers={"Prefer": "respond-async"}).json()["id"]
+    asked = {"tooling": example(), "block_mm": [0.0, 0.0, -5.0, 20.0, 20.0, 0.0], "cell_mm": 1.0, "step_mm": 5.0}
+    files = {"query": (None, json.dumps(asked)), "path": ("PATH.nc", b"G21 G90 G0 X-8 Y10 Z-1\nG1 X28 F900")}
+    path = http.post("/v1/paths/removal", files=files).json()["id"]
     carried(store, folder)
-    return {"/v1/identifications": {"id": id, "campaign": campaign}, "/v1/lobes/": {"id": lobes}, "/v1/holders/": _HOLDER}
+    named = {"/v1/identifications": {"id": id, "campaign": campaign}, "/v1/lobes/": {"id": lobes}, "/v1/paths/{id}": {"id": path}}
+    return named | {"/v1/holders/": _HOLDER}
 
 
 @pytest.mark.slow(45)

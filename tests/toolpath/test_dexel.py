@@ -185,6 +185,18 @@ def test_a_surface_of_triangles_encloses_what_a_boolean_says(seed):
     assert net.volume() == pytest.approx(body.volume(), rel=2e-3)
 
 
+def test_a_surface_has_as_many_triangles_as_may_be():
+    """Coarser, and still closed around nearly as much."""
+    field = DexelField.block(np.zeros(3), HIGH, CELL)
+    Sweep(field, FLAT, ToolPath(np.array([[0.02, 0.015, 0.006], [0.04, 0.015, 0.006]]))).run()
+    _, whole = field.mesh()
+    for most in (20_000, 2_000, 12, 1):
+        points, faces = field.mesh(most)
+        assert 0 < len(faces) <= max(most, 12) < len(whole)
+        if most >= 2_000:
+            assert DexelField.from_mesh(points, faces, CELL).volume == pytest.approx(field.volume, rel=0.08)
+
+
 def test_what_is_no_stock_is_refused():
     points, faces = box([0.0, 0.0, 0.0], [0.01, 0.01, 0.01])
     with pytest.raises(InputError, match="3 edges"):

@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """One service for all; each test makes what it needs under names of its own."""
-    settings = {"RCSA_IDENT_JOB_WORKERS": "1", "RCSA_IDENT_LOBE_WORKERS": "1", "RCSA_IDENT_JOB_NICE": "0"}
+    settings = {"RCSA_IDENT_JOB_WORKERS": "1", "RCSA_IDENT_LOBE_WORKERS": "1", "RCSA_IDENT_PATH_WORKERS": "1", "RCSA_IDENT_JOB_NICE": "0"}
     with serving(tmp_path_factory.mktemp("served"), **settings) as found:
         yield found
 

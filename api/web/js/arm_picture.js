@@ -42,7 +42,8 @@ export function framesOf(joints, angles) {
   return frames;
 }
 
-function eyes(azimuth, elevation) {
+/** Directions to the right, up and towards who looks, as rows. */
+export function eyes(azimuth, elevation) {
   const [a, e] = [azimuth * RAD, elevation * RAD];
   const right = [-Math.sin(a), Math.cos(a), 0];
   const near = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)];
@@ -70,7 +71,7 @@ function hull(points) {
 const round = (v) => Math.round(v * 100) / 100;
 const listed = (points) => points.map((p) => `${round(p[0])},${round(p[1])}`).join(" ");
 /** 1, 2 or 5 times a power of ten, at most so large. */
-function roundLength(most) {
+export function roundLength(most) {
   const power = 10 ** Math.floor(Math.log10(most));
   return power * [5, 2, 1].find((step) => step * power <= most * (1 + 1e-9));
 }

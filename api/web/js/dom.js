@@ -60,6 +60,7 @@ const ICONS = {
   toolings: "M8 3h8v5l-1 2H9L8 8zM10 10h4v5h-4zM11 15h2v6h-2z",
   change: "M4 20V4M4 20h16M5 8c2 7 4 7 5 0 1 8 4 8 5 0 1 9 3 9 5 2",
   robots: "M5 21h8M9 21v-4M9 17a2 2 0 1 1 .1 0M8 13.2 6 8a2.2 2.2 0 1 1 3-2l7 2M16 6.5a1.8 1.8 0 1 1-.1 3.4M17 10l1.5 3M16.5 13h4v3M17.5 13v3",
+  paths: "M4 20V8l8-4 8 4v12zM7 17v-6h4v4h6",
   forces: "M3 12c2-8 4-8 6 0s4 8 6 0 4-8 6 0",
   listen: "M12 3a3 3 0 0 1 3 3v6a3 3 0 0 1-6 0V6a3 3 0 0 1 3-3zM6 11v1a6 6 0 0 0 12 0v-1M12 18v3M9 21h6",
   drop: "M12 3v12M7 10l5 5 5-5M4 17v3h16v-3",

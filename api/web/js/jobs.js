@@ -14,6 +14,9 @@ export function wordsOf(job) {
     if (!job.progress) return "starting";
     const { stage, done, total } = job.progress;
     if (stage === "speeds") return `${done} of ${total} speeds`;
+    if (stage === "removal") return `material taken out on ${done} of ${total} moves`;
+    if (stage === "stability") return `${done} of ${total} different cuts judged`;
+    if (stage === "milling") return `${Math.round((100 * done) / (total || 1))} % of the path milled`;
     return `${stage}${total ? `, ${done} of ${total}` : ""}`;
   }
   if (job.state === "failed") return "failed";

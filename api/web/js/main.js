@@ -38,6 +38,7 @@ route("toolings/edit/:name", "toolings", view("tooling"));
 route("toolings/ring/:name", "toolings", view("ring"));
 route("changes", "toolings", view("changes"));
 route("robots", "robots", view("robots"));
+route("paths", "paths", view("paths"));
 route("change", "change", ofMachine(view("change")));
 route("card", "change", view("tool_card"));
 route("listen", "listen", view("listen"));
@@ -53,6 +54,7 @@ const SECTIONS = [
   ["toolings", "Toolings", "Tools", "toolings"],
   ["change", "Tool change", "Lobes", "change"],
   ["robots", "Robots", "Robots", "robots"],
+  ["paths", "Paths", "Paths", "paths"],
   ["forces", "Forces", "Forces", "forces"],
 ];
 

@@ -173,7 +173,13 @@ export function quantityListInput(kind, values, props = {}) {
     const written = input.value.split(/[\s;]+|,\s+/).filter(Boolean);
     base = written.length ? written.map((each) => Number(each.replace(",", ".")) / factor(kind)) : null;
   });
-  Object.defineProperty(input, "base", { get: () => base });
+  Object.defineProperty(input, "base", {
+    get: () => base,
+    set: (next) => {
+      base = next;
+      show();
+    },
+  });
   input.quantity = show;
   input.dataset.quantity = kind;
   show();

@@ -3,6 +3,12 @@ import { fill, h } from "../dom.js";
 import { field, quantity, select } from "../forms.js";
 import { plain, unit } from "../units.js";
 
+/** The published arms, and a posture at which each would mill [°]. */
+export const PUBLISHED = {
+  tx200: [-11.71, 20.78, 110, 82.76, 60.8, -166.96],
+  kr210: [20, 10, 30, 0, 30, 0],
+  kr500: [-71.73, -68.62, 110.51, 35.54, -47.68, -204.68],
+};
 /** Name in the address, kind, default, name in the body, label. */
 export const NUMBERS = [
   ["im", "percent", 50, "cut.immersion", "Radial immersion"],

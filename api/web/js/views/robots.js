@@ -6,14 +6,8 @@ import { dropZone } from "../drop.js";
 import { busy, clearFaults, confirmed, failed, showProblem } from "../forms.js";
 import { remember, to } from "../router.js";
 import { mapCard, modesCard, postureCard, postureLobes } from "./robot_answers.js";
-import { jointSliders, robotForm } from "./robot_form.js";
+import { jointSliders, PUBLISHED, robotForm } from "./robot_form.js";
 
-/** The published arms, and a posture at which each would mill [°]. */
-const PUBLISHED = {
-  tx200: [-11.71, 20.78, 110, 82.76, 60.8, -166.96],
-  kr210: [20, 10, 30, 0, 30, 0],
-  kr500: [-71.73, -68.62, 110.51, 35.54, -47.68, -204.68],
-};
 const NAME = /[^A-Za-z0-9 ._+()-]/g;
 /** How long a hand rests before its posture is asked about [ms]. */
 const REST = { posture: 120, lobes: 400 };

@@ -1,0 +1,37 @@
+"""A tool along a path through stock, as a job: one step, whose progress is told as it goes."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+
+from api.jobs.codec import Unknown, decode, encode
+from api.jobs.job_context import JobContext
+from api.stores.jobs import Job, Outcome
+from api.work import paths
+from api.work.paths import PathRequest
+from api.work.pool import guarded
+from api.work.requests import MachineText, ToolingSource
+from rcsa_ident.errors import InputError
+
+
+def asked(machine: MachineText | None, called: str, tooling: ToolingSource, request: PathRequest) -> str:
+    """Return the text of a job: machine, what answers call it, tooling and path as they are now."""
+    return encode((machine, called, tooling, request))
+
+
+def carry(job: Job, context: JobContext) -> Outcome:
+    """Cut along the path of a job's text ``question``.
+
+    Raises
+    ------
+    InputError
+        Another version of the service has accepted the question, and this one cannot read it.
+    """
+    try:
+        machine, called, tooling, request = decode(str(context.jobs.text(job.id, "question")))
+    except Unknown:
+        raise InputError("question", "one of another version of the service", "the same question, asked again") from None
+    found = context.remember("path", partial(guarded, paths.cut, machine, tooling, request, context.progress))
+    answer = json.dumps({"machine": called, **json.loads(found["answer"])}, allow_nan=False)
+    return Outcome("done", "", texts={"answer": answer, "table": found["table"]})
