@@ -267,7 +267,13 @@ def _judged(
 def _milled(change: ToolChange, path: ToolPath, field: DexelField, request: PathRequest, told: Told) -> tuple[dict[str, Any], str]:
     """What happens turn by turn, and the walls that are left."""
     found = mill_path(
-        change, path, field, request.turn_steps, request.play, request.cutoff, lambda done, total: told("milling", done, total)
+        change,
+        path,
+        field,
+        request.turn_steps,
+        request.play,
+        cutoff=request.cutoff,
+        progress=lambda done, total: told("milling", done, total),
     )
     columns = milling_columns(found, path)
     table = columns_text(columns)

@@ -120,6 +120,7 @@ def mill(
     cut: PathCutOptions,
     steps: Annotated[int, typer.Option(help="Instants of a turn.", min=60, max=20000)] = 360,
     play: Annotated[bool, typer.Option("--play/--no-play", help="With the play of a robot's drives.")] = True,
+    weight: Annotated[bool, typer.Option("--weight/--no-weight", help="Whether the arm's weight holds that play.")] = True,
     surface: Annotated[Path | None, typer.Option(help="SURFACE.csv to write: the walls that are left.", show_default=False)] = None,
     cutoff_mm: Annotated[float, typer.Option(help="Of the Gaussian filter (ISO 16610-21) for Ra, Rq and Rt.")] = 0.8,
     json_: Json = False,
@@ -137,7 +138,7 @@ def mill(
     field = field_of(tooling, *stock_of(cut.stock), metres("--cell-mm", cut.cell_mm))
     stages = Stages(quiet=json_)
     with stages.stage("milling") as line:
-        found = mill_path(change, path, field, steps, play, 1e-3 * positive("--cutoff-mm", cutoff_mm, "mm"), line)
+        found = mill_path(change, path, field, steps, play, weight, 1e-3 * positive("--cutoff-mm", cutoff_mm, "mm"), line)
     write_columns(out, milling_columns(found, path))
     if surface is not None:
         write_columns(surface, _surface_columns(found, path))

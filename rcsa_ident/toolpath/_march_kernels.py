@@ -42,8 +42,9 @@ class Springs(NamedTuple):
     damping: np.ndarray
     stiffness: np.ndarray
     load: np.ndarray
-    #: (3, n) of the tip.
+    #: (3, n) of the tip, and (3,) where it counts as on its path.
     motion: np.ndarray
+    zero: np.ndarray
     play: np.ndarray
 
 
@@ -179,7 +180,7 @@ def march(springs, swings, going, teeth, columns, course, step, solved, forces, 
     course: (count, 3) angle of tooth 1, place along the feed and beside it; step: between instants; solved: by which ports may move in the
     last pass of an instant; forces, tips: (count, 3) to fill.
     """
-    inverse, damping, stiffness, load, motion, play = springs
+    inverse, damping, stiffness, load, motion, zero, play = springs
     factor, early, late, outputs, inputs, constant = swings
     state, swing, before, trail, held = going
     edges, lags = teeth.edges, teeth.lags
@@ -225,8 +226,8 @@ def march(springs, swings, going, teeth, columns, course, step, solved, forces, 
             gain[i] = 0.0
             for m in range(n):
                 gain[i] += inverse[i, m] * right[m]
-        there[:] = 0.0
         for d in range(3):
+            there[d] = -zero[d]
             for m in range(n):
                 there[d] += motion[d, m] * (place[m] + quarter * gain[m])
         for p in range(loose.size):

@@ -44,6 +44,8 @@ class Carrier:
         Half of it: a spring feels nothing within.
     load : array, shape (n,), default none
         That is always there, as weight is.
+    zero : array, shape (3,), default none [m]
+        Where the tip counts as on its path: the sag at which the workpiece was touched.
     modes : PoleResidue or None
         From the force to what the tip moves by besides, 3 by 3.
 
@@ -61,11 +63,13 @@ class Carrier:
     motion: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
     play: FloatArray = field(default=None)  # type: ignore[arg-type]
     load: FloatArray = field(default=None)  # type: ignore[arg-type]
+    zero: FloatArray = field(default=None)  # type: ignore[arg-type]
     modes: PoleResidue | None = None
 
     def __post_init__(self) -> None:
         n = np.shape(self.stiffness)[0]
-        for name, shape in (("mass", (n, n)), ("damping", (n, n)), ("stiffness", (n,)), ("motion", (3, n)), ("play", (n,)), ("load", (n,))):
+        shapes = {"mass": (n, n), "damping": (n, n), "stiffness": (n,), "motion": (3, n), "play": (n,), "load": (n,), "zero": (3,)}
+        for name, shape in shapes.items():
             given = getattr(self, name)
             values = frozen(np.zeros(shape) if given is None else given)
             if values.shape != shape or not np.all(np.isfinite(values)):
@@ -114,6 +118,11 @@ class Carrier:
         """Where the load leaves the freedoms, shape (n,)."""
         twist = self.load / self.stiffness
         return twist + np.sign(twist) * self.play
+
+    @property
+    def sag(self) -> FloatArray:
+        """Where the load leaves the tip, shape (3,) [m]."""
+        return np.asarray(self.motion @ self.rest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -255,7 +264,7 @@ def march(before: March, carrier: Carrier, cut: Cut, walls: Walls, places: Float
     second = (first - 1.0) / turn
     went = kernels.Going(before.state.copy(), before.swing.copy(), before.force[-1].copy(), before.trail.copy(), before.held.copy())
     unsettled = kernels.march(
-        kernels.Springs(inverse, carrier.damping, carrier.stiffness, carrier.load, carrier.motion, carrier.play),
+        kernels.Springs(inverse, carrier.damping, carrier.stiffness, carrier.load, carrier.motion, carrier.zero, carrier.play),
         kernels.Swings(np.exp(turn), step * (first - second), step * second, modes.outputs, modes.inputs, modes.constant),
         went,
         kernels.Teeth(edges, parts.lag - cut.cutter.tooth_angle[:, None], np.array(cutting)),

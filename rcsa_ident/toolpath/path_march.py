@@ -254,13 +254,18 @@ class _Marcher:
         before = self.went
         if before.state.shape == fresh.state.shape:
             fresh = replace(fresh, state=before.state)
-        if before.swing.shape == fresh.swing.shape and _same_poles(self.modes, carrier.modes):
-            fresh = replace(fresh, swing=before.swing)
         old = self.before[0]
+        turn = frame.turn @ old.turn.T
+        if _same_poles(self.modes, carrier.modes):
+            fresh = replace(fresh, swing=before.swing)
+        elif carrier.modes is not None:
+            # other modes stand where the mean force of the last turn holds them
+            mean = before.force[-self.options.steps :].mean(axis=0)
+            mean[:2] = turn @ mean[:2]
+            fresh = replace(fresh, swing=-(carrier.modes.inputs @ mean) / carrier.modes.pole)
         if before.trail.shape == fresh.trail.shape:
             trail = frame.to(old.back(before.trail.reshape(-1, 2))).reshape(before.trail.shape)
             fresh = replace(fresh, trail=trail, held=before.held)
-        turn = frame.turn @ old.turn.T
         force = before.force[-1:].copy()
         force[:, :2] = force[:, :2] @ turn.T
         return replace(fresh, force=force, lost=before.lost)

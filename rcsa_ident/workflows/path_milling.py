@@ -173,6 +173,7 @@ def mill_path(
     field: DexelField,
     steps: int = 360,
     play: bool = True,
+    weight: bool = True,
     cutoff: float = 0.8e-3,
     progress: Callable[[int, int], None] | None = None,
 ) -> PathMilling:
@@ -189,6 +190,8 @@ def mill_path(
         Of a turn, at least; more where modes swing fast.
     play : bool
         With the play of a robot's drives.
+    weight : bool
+        Whether the arm's weight holds that play.
     cutoff : float [m]
         Of the filter for roughness.
     progress : callable, optional
@@ -204,7 +207,7 @@ def mill_path(
         untold = ~(path.speed > 0.0)
         path = replace(path, speed=np.where(untold, change.speeds[0], path.speed))
     stations = stations_along(change.machine, tooling, path)
-    carriers = carriers_of(change, lambda move: stations(move).machine, path.speed[1:], play)
+    carriers = carriers_of(change, lambda move: stations(move).machine, path.speed[1:], play, weight)
     sweep = Sweep(field, solid_of(tooling), path)
     done = np.concatenate([[0.0], np.cumsum(path.lengths)])
     parts, surfaces, worst = [], [], None
@@ -263,7 +266,7 @@ def _surface_rows(part: MilledPart, side: int, x: FloatArray, error: FloatArray)
 
 
 def carriers_of(
-    change: ToolChange, stations: Callable[[int], TipSource], speeds: FloatArray, play: bool = True
+    change: ToolChange, stations: Callable[[int], TipSource], speeds: FloatArray, play: bool = True, weight: bool = True
 ) -> Callable[[int, PathFrame], Carrier]:
     """Return who carries a tool on the moves of a path, as `toolpath.path_march.mill_along` asks for it.
 
@@ -277,6 +280,8 @@ def carriers_of(
         Of the spindle on each move.
     play : bool
         With the play of a robot's drives.
+    weight : bool
+        Whether the arm's weight holds its play. The sag of the first move counts as known: the workpiece was touched with it.
     """
     known: dict[tuple[int, float], Carrier] = {}
 
@@ -284,7 +289,8 @@ def carriers_of(
         machine, speed = stations(move), float(speeds[move])
         key = id(machine), speed
         if key not in known:
-            known[key] = _carrier(replace(change, machine=machine, speeds=np.array([speed])), play)
+            found = _carrier(replace(change, machine=machine, speeds=np.array([speed])), play, weight)
+            known[key] = replace(found, zero=next(iter(known.values())).zero if known else found.sag)
         return seen_from(known[key], frame)
 
     return carrier
@@ -318,12 +324,13 @@ def tip_modes(change: ToolChange) -> PoleResidue:
     return PoleResidue(modes.pole, outputs, inputs, constant)
 
 
-def _carrier(change: ToolChange, play: bool) -> Carrier:
+def _carrier(change: ToolChange, play: bool, weight: bool) -> Carrier:
     machine, modes = change.machine, tip_modes(change)
     if not (play and isinstance(machine, PosedRobot) and any(joint.backlash for joint in machine.robot.model.joints)):
         return Carrier(modes=modes)
     # the arm by its freedoms, for their play; modes tell what tool and spindle add to it
     assembly = machine.fitted(change.tooling).assembly
-    arm = arm_carrier(machine.robot, machine.angles, machine.turn, assembly.stickout + assembly.holder_length)
+    lever = assembly.stickout + assembly.holder_length
+    arm = arm_carrier(machine.robot, machine.angles, machine.turn, lever, weight=weight)
     alone = arm.poles
     return replace(arm, modes=PoleResidue.joined([modes, PoleResidue(alone.pole, -alone.outputs, alone.inputs, alone.constant)]))

@@ -81,6 +81,7 @@ def test_above_the_path_what_the_ray_has_not_swept_stays() -> None:
 def test_a_march_is_that_of_the_full_equations() -> None:
     """Two freedoms, one with play, and a mode: every instant's equations by brute force, with the force of `cut_force` in both."""
     step, count, radius = 2e-5, 120, 0.005
+    zero = np.array([3e-6, -5e-6, 1e-6])
     mass, damping = np.array([[2.0, 0.3], [0.3, 1.5]]), np.array([[300.0, 40.0], [40.0, 250.0]])
     stiffness, play, load = np.array([2e6, 3e6]), np.array([0.0, 5e-6]), np.array([4.0, -9.0])
     motion = np.array([[1.0, 0.2], [0.1, 1.0], [0.05, -0.1]])
@@ -92,7 +93,7 @@ def test_a_march_is_that_of_the_full_equations() -> None:
     second = (first - 1.0) / turn
     swings = kernels.Swings(np.exp(turn), step * (first - second), step * second, outputs, inputs, np.zeros((3, 3)))
     inverse = np.linalg.inv(mass + 0.5 * step * damping + 0.25 * step**2 * np.diag(stiffness))
-    springs = kernels.Springs(inverse, damping, stiffness, load, motion, play)
+    springs = kernels.Springs(inverse, damping, stiffness, load, motion, zero, play)
     teeth = kernels.Teeth(
         np.array([[[radius, 1.0, 0.0, 1e-3]], [[radius, 1.0, 0.0, 1e-3]]]),
         np.array([[0.0], [np.pi]]),
@@ -124,7 +125,7 @@ def test_a_march_is_that_of_the_full_equations() -> None:
             here = q + step * v + 0.25 * step**2 * (a + new)
             rate = v + 0.5 * step * (a + new)
             swing = swings.factor * p + swings.early * (inputs @ before) + swings.late * (inputs @ force)
-            tip = motion @ here + 2.0 * (outputs @ swing).real
+            tip = motion @ here - zero + 2.0 * (outputs @ swing).real
             kernels.cut_force(other, teeth, (course[t, 1] + tip[0], course[t, 2] + tip[1], tip[2]), turned, chips, force)
             felt = here - np.clip(here, -play, play)
             new = np.linalg.solve(mass, load + motion.T @ force - damping @ rate - stiffness * felt)

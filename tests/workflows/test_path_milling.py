@@ -134,8 +134,15 @@ def test_a_robot_mills_with_its_play() -> None:
     change = ToolChange(machine, tooling, question(18000.0).cut, np.array([18000.0 * 2.0 * np.pi / 60.0]), 0.02, draws=0)
     path = ToolPath(np.array([[0.775, 0.1847, 0.1554], [0.795, 0.1847, 0.1554]]), feed=np.full(2, 0.05))
     block = np.array([0.785, 0.15, 0.14]), np.array([0.82, 0.182, 0.1559])
-    tight, loose = (mill_path(change, path, field_of(tooling, block, cell=0.5e-3), play=play) for play in (False, True))
+    tight, loose, held = (
+        mill_path(change, path, field_of(tooling, block, cell=0.5e-3), play=play, weight=weight)
+        for play, weight in ((False, False), (True, False), (True, True))
+    )
     late = slice(-20, None)
     assert np.abs(loose.mean_tip[late]).max() > 2.0 * np.abs(tight.mean_tip[late]).max()
+    # the arm's weight takes up the play of joints that it loads, and its own sag is no error
+    assert np.abs(held.mean_tip[:3]).max() < 1e-9
+    off = [float(np.mean(each.mean_tip[late, 1])) for each in (tight, loose, held)]
+    assert off[0] < off[2] < 0.9 * off[1]
     assert tight.places[:, 2] == pytest.approx(0.1554)
     assert not tight.lost
