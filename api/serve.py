@@ -180,7 +180,7 @@ def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event)
     carriers: dict[str, Carrier] = {
         "identification": partial(identification.carry, load, spread=spread),
         "lobes": lobes.carry,
-        "path": paths.carry,
+        "path": partial(paths.carry, most=settings.job_work_seconds),
     }
     JobWorker(store.jobs, Durable(settings.engine_url), {kind: carriers[kind]}, settings.job_attempts).run(ready, stop)
 

@@ -130,7 +130,12 @@ class Settings(BaseSettings):
     job_attempts: int = Field(
         10, ge=1, le=1000, description="times that a job is taken up again without coming further before it is given up"
     )
-    job_work_seconds: _Seconds = Field(4.0 * 3600.0, ge=1.0, le=10**7, description="estimated work of lobes as a job; 422")
+    job_work_seconds: _Seconds = Field(
+        4.0 * 3600.0,
+        ge=1.0,
+        le=10**7,
+        description="estimated work of lobes as a job; 422. A tool along a path that has taken longer has failed",
+    )
     keep_events_days: _Days = Field(
         0.0, ge=0.0, le=36_500.0, description="after the end of a job, for which its events are kept; 0 for ever"
     )

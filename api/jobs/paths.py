@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from functools import partial
 
 from api.jobs.codec import Unknown, decode, encode
@@ -20,18 +21,33 @@ def asked(machine: MachineText | None, called: str, tooling: ToolingSource, requ
     return encode((machine, called, tooling, request))
 
 
-def carry(job: Job, context: JobContext) -> Outcome:
+def carry(job: Job, context: JobContext, most: float) -> Outcome:
     """Cut along the path of a job's text ``question``.
+
+    Parameters
+    ----------
+    job : Job
+    context : JobContext
+    most : float [s]
+        Of work; how many unlike cuts a path has is known only when it is cut.
 
     Raises
     ------
     InputError
-        Another version of the service has accepted the question, and this one cannot read it.
+        Another version of the service has accepted the question, and this one cannot read it; or it is too much work.
     """
     try:
         machine, called, tooling, request = decode(str(context.jobs.text(job.id, "question")))
     except Unknown:
         raise InputError("question", "one of another version of the service", "the same question, asked again") from None
-    found = context.remember("path", partial(guarded, paths.cut, machine, tooling, request, context.progress))
+    start = time.monotonic()
+
+    def told(stage: str, done: int, total: int) -> None:
+        context.progress(stage, done, total)
+        if time.monotonic() - start > most:
+            found = f"one that takes more than {most:g} s; {done} of {total} were done ({stage})"
+            raise InputError("path", found, "a shorter one, places farther apart, no bands, zero-order")
+
+    found = context.remember("path", partial(guarded, paths.cut, machine, tooling, request, told))
     answer = json.dumps({"machine": called, **json.loads(found["answer"])}, allow_nan=False)
     return Outcome("done", "", texts={"answer": answer, "table": found["table"]})

@@ -162,15 +162,13 @@ def weighed(machine: MachineText | None, tooling: ToolingSource, request: PathRe
             f"cells for which it takes at most {MOST_MEMORY / 1e6:g} MB",
         )
     step = STEP * solid.radius if request.step is None else request.step
-    if request.kind == "milling":
+    milled = request.kind == "milling"
+    if milled:
         _count_instants(path, request)
-        places = len(path)
-    else:
-        places = int(path.length / step) + len(path)
-        if places > MOST_PLACES:
-            raise InputError(
-                "step_mm", f"{1e3 * step:g} mm, which makes {places} places of the path", f"steps that make at most {MOST_PLACES}"
-            )
+    places = len(path) + (0 if milled else int(path.length / step))
+    if places > MOST_PLACES:
+        field, found = ("path", "one") if milled else ("step_mm", f"{1e3 * step:g} mm, which makes one")
+        raise InputError(field, f"{found} of {places} places", f"at most {MOST_PLACES} of them")
     meetings = places * (2.0 * solid.radius / cell) ** 2
     if meetings > MOST_MEETINGS:
         raise InputError(

@@ -77,7 +77,7 @@ def running(store: Store, machine: str, **changed: Any) -> str:
 
 def carriers(store: Store, folder: Path) -> dict[str, Carrier]:
     load = partial(load_campaign, store, Files(folder / "files", 10**12, 0))
-    return {"identification": partial(identification.carry, load), "lobes": lobes.carry, "path": paths.carry}
+    return {"identification": partial(identification.carry, load), "lobes": lobes.carry, "path": partial(paths.carry, most=600.0)}
 
 
 def carried(store: Store, folder: Path, steps: Steps | None = None) -> Steps:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 
-from api.jobs import job_context
+from api.jobs import job_context, paths
 from api.jobs.worker import carry
 from api.schemas.paths import PathMillingQuery, PathStabilityQuery, RemovalQuery
 from api.work import path_answers
@@ -240,6 +241,8 @@ def test_files_that_are_none_are_refused(shop, program, tmp_path):
     program.write_text(PROGRAM.replace("F960", "F1"))
     long = {"turn_steps": 20_000}
     assert refused(422, client.cut_path, "milling", program, "T1", id, **COARSE, **MATERIAL, **long).errors[0].field == "path"
+    program.write_text("G21 G90 S8000 F96000\n" + "G1 X1\nG1 X0\n" * (work.MOST_PLACES // 2 + 1))
+    assert "places" in refused(422, client.cut_path, "milling", program, "T1", id, **COARSE, **MATERIAL).errors[0].found
     program.write_text("X" * (work.LARGEST_PATH + 1))
     refused(413, client.cut_path, "removal", program, "T1", **COARSE)
     form = {"query": (None, json.dumps({"tooling": "T1", **COARSE}), "application/json")}
@@ -273,6 +276,18 @@ def test_a_repeated_request_begins_one_job(client, program):
     assert first.headers["Location"] == f"/v1/paths/{first.json()['id']}"
     program.write_text(PROGRAM.replace("X40", "X41"))
     assert send("k").status_code == 409
+
+
+def test_there_is_an_end_to_long_work(client, store, tmp_path, program):
+    client.write_tooling("T1", by_hand.TOOLING)
+    job = client.cut_path("removal", program, "T1", **COARSE).id
+    short = carriers(store, tmp_path) | {"path": partial(paths.carry, most=0.0)}
+    carry(store.jobs, short, "here", 3, job, lambda name, compute: compute())
+    found = client.path_job(job)
+    assert (found.job.state, found.answer) == ("failed", None)
+    (fault,) = found.job.problem.errors
+    assert fault.field == "path"
+    assert "(removal)" in fault.found
 
 
 def test_it_is_cancelled_while_it_waits_and_while_it_cuts(monkeypatch, client, store, tmp_path, program):

@@ -2,8 +2,8 @@
 import { h, s } from "../dom.js";
 import { factor, plain, u, unit } from "../units.js";
 
-/** Blue to red over white, from blue to yellow, told apart by those who see fewer colours, too; as [r, g, b]. */
-const AROUND = [[178, 45, 40], [232, 140, 105], [242, 236, 230], [120, 170, 214], [34, 94, 168]];
+/** Red to blue over a yellow that no bare material has, and from blue to yellow; told apart by those who see fewer colours, too. As [r, g, b]. */
+const AROUND = [[178, 45, 40], [236, 124, 82], [255, 236, 150], [110, 172, 210], [34, 94, 168]];
 const RISING = [[53, 42, 135], [20, 105, 190], [36, 160, 170], [125, 190, 110], [225, 190, 70], [250, 240, 70]];
 
 /** Key, words, kind of the unit, colours, the middle between which two colours part, and the column. */
