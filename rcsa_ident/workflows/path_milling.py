@@ -32,6 +32,8 @@ _FAR, _ELSEWHERE, _SAME = 0.15, 0.01, 0.1
 _STILL, _FEWEST, _BENT = 1e-7, 9, 2.0
 #: What falls further from the first third of a run to the last one dies out.
 _DYING = 0.8
+#: Share of instants that may stay unsettled: a tooth that comes in or not, as the tip stands, has no place between.
+_UNSETTLED = 1e-3
 #: Between places of walls that are told [m].
 _SURFACE = 2e-5
 _ROWS = ("time", "places", "mean_force", "peak_force", "mean_tip", "once", "swing")
@@ -70,8 +72,8 @@ class PathMilling:
         Of the roughest wall that is long enough.
     lost : bool
         Whether the tool was ever so far off its path that nothing after it counts.
-    unsettled : int
-        Instants at which force and deflection did not agree.
+    unsettled : float
+        Share of the instants at which force and deflection did not agree, as where a tooth comes in at just that place.
     """
 
     move: np.ndarray
@@ -87,7 +89,7 @@ class PathMilling:
     surface: FloatArray
     roughness: Roughness | None
     lost: bool
-    unsettled: int
+    unsettled: float
 
     @property
     def chattering(self) -> tuple[int, ...]:
@@ -118,7 +120,7 @@ class PathMilling:
         """``stable``, ``chatter``, ``no cut``, ``lost``, or ``not converged``."""
         if self.lost:
             return "lost"
-        if self.unsettled:
+        if self.unsettled > _UNSETTLED:
             return "not converged"
         if not np.any(self.peak_force > 0.0):
             return "no cut"
@@ -136,8 +138,8 @@ class PathMilling:
         told = []
         if self.lost:
             told.append("the tool left its path by more than a tenth of its radius: what follows means nothing")
-        if self.unsettled:
-            told.append(f"at {self.unsettled} instants force and deflection did not agree: take more steps a turn")
+        if self.unsettled > _UNSETTLED:
+            told.append(f"at {100.0 * self.unsettled:.2g} % of all instants force and deflection did not agree: take more steps a turn")
         return tuple(told)
 
     def described(self, path: ToolPath) -> str:
@@ -248,7 +250,7 @@ def mill_path(
         np.concatenate(surfaces) if surfaces else np.zeros((0, 6)),
         worst,
         any(part.lost for part in parts),
-        sum(part.unsettled for part in parts),
+        sum(part.unsettled for part in parts) / max(move.size * steps, 1),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -235,8 +236,16 @@ def cuts_along(
         rows["deflection"],
         rows["error"],
         len(groups),
-        tuple(dict.fromkeys(warnings)),
+        _alike_once(warnings),
     )
+
+
+def _alike_once(warnings: Sequence[str]) -> tuple[str, ...]:
+    """The first of all sentences that differ in their numbers alone: every cut has its own."""
+    first: dict[str, str] = {}
+    for each in warnings:
+        first.setdefault(re.sub(r"[\d.]+", "#", each), each)
+    return tuple(first.values())
 
 
 def plain(found: EngagementMap) -> tuple[AnyEngagement, float]:
