@@ -253,7 +253,7 @@ def _judged(
         columns = stability_columns(found, way, moves)
         worst, table = found.margin_low[moves], columns_text(columns)
         sentences = sentences_of(described(found, way))
-        status = "no cut" if not moves.size else "chatter" if float(worst.min()) < 1.0 else "stable"
+        status = "no cut" if not moves.size else "chatter" if float(found.margin[moves].min()) < 1.0 else "stable"
         warnings += [*tool.remarks, *stands.remarks, *found.warnings]
     columns |= {"removed_volume_mm3": volume[moves], "way_mm": way_along(way)[moves], "length_mm": 1e3 * way.lengths[moves]}
     shown, row = thinned(columns, worst)

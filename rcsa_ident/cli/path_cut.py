@@ -138,7 +138,9 @@ def mill(
     field = field_of(tooling, *stock_of(cut.stock), metres("--cell-mm", cut.cell_mm))
     stages = Stages(quiet=json_)
     with stages.stage("milling") as line:
-        found = mill_path(change, path, field, steps, play, weight, 1e-3 * positive("--cutoff-mm", cutoff_mm, "mm"), line)
+        found = mill_path(
+            change, path, field, steps, play, weight, 1e-3 * positive("--cutoff-mm", cutoff_mm, "mm"), surface is not None, line
+        )
     write_columns(out, milling_columns(found, path))
     if surface is not None:
         write_columns(surface, _surface_columns(found, path))
@@ -196,10 +198,11 @@ def _summary(found: CutsAlong, path: ToolPath) -> dict[str, Any]:
     data: dict[str, Any] = {"moves": len(path) - 1, "cutting_moves": int(cutting.size), "different_cuts": found.groups}
     if not cutting.size:
         return data
-    worst = int(cutting[np.argmin(found.margin_low[cutting])])
+    worst = int(cutting[np.argmin(found.margin[cutting])])
     errors = found.form_error[np.isfinite(found.form_error)]
     return data | {
-        "chattering_moves": int(np.count_nonzero(found.margin_low[cutting] < 1.0)),
+        "chattering_moves": int(np.count_nonzero(found.margin[cutting] < 1.0)),
+        "doubtful_moves": int(np.count_nonzero((found.margin_low[cutting] < 1.0) & (found.margin[cutting] >= 1.0))),
         "least_margin": float(found.margin[worst]),
         "least_margin_low": float(found.margin_low[worst]),
         "at_mm": (1e3 * path.places[worst + 1]).tolist(),

@@ -183,6 +183,34 @@ class DexelField(Shown):
         last = np.maximum(count.astype(np.intp) - 1, 0)[:, :, None, None]
         return np.where(count > 0, np.take_along_axis(seg[..., 1:], last, axis=2)[:, :, 0, 0], np.nan)
 
+    def heights_beside(self, start: FloatArray, stop: FloatArray, reach: float, level: float) -> tuple[float, float] | None:
+        """Return between which heights there is material above a level near a line in the plane, [m]; None where there is none.
+
+        Parameters
+        ----------
+        start, stop : arrays, shape (2,) [m]
+        reach : float [m]
+            From the line.
+        level : float [m]
+        """
+        ends = np.stack([start, stop])
+        first, step = self.lattice[0, :2], self.lattice[1, :2]
+        low = np.maximum(np.ceil((ends.min(axis=0) - reach - first) / step), 0).astype(int)
+        high = np.minimum(np.floor((ends.max(axis=0) + reach - first) / step), np.array(self.shape[:2]) - 1).astype(int)
+        if np.any(high < low):
+            return None
+        x, y = (first[k] + step[k] * np.arange(low[k], high[k] + 1) for k in range(2))
+        way = ends[1] - ends[0]
+        square = float(way @ way)
+        along = (x[:, None] - start[0]) * way[0] + (y - start[1]) * way[1]
+        share = np.clip(along / square, 0.0, 1.0) if square > 0.0 else np.zeros_like(along)
+        near = np.hypot(x[:, None] - start[0] - share * way[0], y - start[1] - share * way[1]) <= reach
+        seg, count = (each[low[0] : high[0] + 1, low[1] : high[1] + 1] for each in (self.segs[2], self.counts[2]))
+        held = near[..., None] & (np.arange(seg.shape[2]) < count[..., None]) & (seg[..., 1] > level)
+        if not held.any():
+            return None
+        return max(float(seg[..., 0][held].min()), level), float(seg[..., 1][held].max())
+
     def mesh(self, most: int | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the material's surface: points, shape (v, 3) [m], and triangles, shape (f, 3), counterclockwise from outside.
 

@@ -17,16 +17,20 @@ from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import Sweep
 from rcsa_ident.toolpath.walls import NOTHING, PathFrame, Walls
 
-#: Longest part of a move that is marched at once: the walls around it are in memory [m].
-_PART = 0.05
+#: Longest part of a move that is marched at once, and its most instants: walls and histories are in memory [m].
+_PART, _INSTANTS = 0.05, 1e6
 #: Thickness of a slice [m], and how many there are.
 _SLICE, _FEWEST, _MOST = 0.3e-3, 6, 24
+#: Instants of the fastest mode's period, and of a turn at most.
+_WAVE, _MOST_STEPS = 16.0, 20000
 #: Turn between moves up to which teeth find what teeth left before it; beyond, what a rigid tool would have left [rad].
 _BEND = np.radians(30.0)
+#: Material that is thinner counts as none [m].
+_THIN = 1e-6
 #: Share of the radius by which a wall may stand off the path's own.
 _OTHER_WALL = 0.1
-#: A move shorter than this is none, one that climbs more than this share is not level [m, -].
-_NOWHERE, _LEVEL = 1e-7, 1e-6
+#: A move shorter than this is none, one that climbs more than this is not level [m].
+_NOWHERE, _LEVEL = 1e-7, 2e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +51,8 @@ class MilledPart:
         By which the tip was off.
     once : array, shape (n, 2) [m]
         The tip at the same angle of each turn: it stands still where a cut repeats itself.
+    within : array, shape (n,) [m]
+        By which the tip stands elsewhere at angles of the turn at which the teeth stand alike; 0 of a cutter that has one such angle.
     swing : array, shape (n,) [m]
         From end to end of its way across the axis.
     frame : PathFrame
@@ -72,6 +78,7 @@ class MilledPart:
     peak_force: FloatArray
     mean_tip: FloatArray
     once: FloatArray
+    within: FloatArray
     swing: FloatArray
     frame: PathFrame
     walls: Walls
@@ -104,7 +111,7 @@ class MarchOptions:
     Parameters
     ----------
     steps : int
-        A turn.
+        A turn, at least: more where modes of the tip swing fast beside it.
     spacing : float [m]
         Of the walls' columns.
     """
@@ -156,13 +163,13 @@ def mill_along(
             found = marcher.march(move, start, stop, float(times[move]))
             if found is not None:
                 yield found
-        marcher.pending = move
+        marcher.pending.append(move)
     marcher.rest()
 
 
 def _marched(path: ToolPath, sweep: Sweep, move: int) -> bool:
     length = float(path.lengths[move])
-    return bool(path.cutting[move] and sweep.upright[move] and length > _NOWHERE and abs(path.moves[move, 2]) <= _LEVEL * length)
+    return bool(path.cutting[move] and sweep.upright[move] and length > _NOWHERE and abs(path.moves[move, 2]) <= _LEVEL)
 
 
 class _Marcher:
@@ -178,27 +185,34 @@ class _Marcher:
     ) -> None:
         self.sweep, self.cutter, self.coefficients, self.carriers, self.options = sweep, cutter, coefficients, carriers, options
         self.went: March | None = None
-        self.before: tuple[PathFrame, Walls, np.ndarray] | None = None
+        self.before: tuple[PathFrame, Walls, np.ndarray, Cut] | None = None
         self.modes: object = None
         #: Time, place, force and tip at the instants of a turn that is not whole yet.
         self.rest_of_turn = np.empty((0, 10))
-        #: Move whose sweep is not made yet: a rigid tool would take the chips that the teeth have still before them.
-        self.pending: int | None = None
+        #: Moves whose sweeps are not made yet: a rigid tool would take the chips that the teeth have still before them.
+        self.pending: list[int] = []
+        #: How often a turn the teeth stand alike.
+        self.alike = cutter.symmetry
+        #: Instants of a turn now, and time since the last one [s].
+        self.steps, self.since = options.steps, 0.0
 
     def rest(self) -> None:
         """Let the tool come to rest."""
         self.went = self.before = None
-        self.rest_of_turn = np.empty((0, 10))
+        self.rest_of_turn, self.since = np.empty((0, 10)), 0.0
         self._sweep()
 
     def _sweep(self) -> None:
-        if self.pending is not None:
-            self.sweep.run(self.pending, self.pending + 1, been=self.pending > 0)
-        self.pending = None
+        for move in self.pending:
+            self.sweep.run(move, move + 1, been=move > 0)
+        self.pending = []
 
     def parts(self, move: int) -> list[tuple[float, float]]:
         """Shares of a move that are marched at once."""
-        count = int(np.ceil(self.sweep.path.lengths[move] / _PART))
+        path = self.sweep.path
+        length, feed, speed = float(path.lengths[move]), float(path.feed[move + 1]), float(path.speed[move + 1])
+        instants = self.options.steps * speed / (2.0 * np.pi) * length / feed
+        count = int(np.ceil(max(length / _PART, instants / _INSTANTS)))
         ends = np.linspace(0.0, 1.0, count + 1)
         return list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
 
@@ -206,42 +220,78 @@ class _Marcher:
         path, field = self.sweep.path, self.sweep.field
         way, length, feed, speed = path.moves[move], float(path.lengths[move]), float(path.feed[move + 1]), float(path.speed[move + 1])
         if not speed > 0.0:
-            raise InputError("spindle speed", f"none on the move to line {path.line[move + 1]}", "one on every move that cuts")
+            stands = "0, the spindle stands" if speed == 0.0 else "none"
+            raise InputError("spindle speed", f"{stands} on the move to {self._told(move)}", "one above 0 on every move that cuts")
         here = path.places[move] + start * way
-        depth = min(self.sweep.solid.edge, float(field.high[2] - here[2]))
-        if depth <= 0.0:
+        frame, span = PathFrame(here[:2], float(np.arctan2(way[1], way[0]))), (stop - start) * length
+        cut = self._cut(frame, span, here[2], speed)
+        if cut is None:
             self.rest()
             return None
-        slices = int(np.clip(np.ceil(depth / _SLICE), _FEWEST, _MOST))
-        cut = Cut(self.cutter, self.coefficients, depth, speed, slices)
         parts = cut.parts
-        frame = PathFrame(here[:2], float(np.arctan2(way[1], way[0])))
-        reach = 1.2 * float(np.max(parts.radius + parts.offset.max(axis=0)))
-        span = (stop - start) * length
-        goes_on = self._goes_on(frame, parts.radius.size)
+        reach = self._reach
+        goes_on = self._goes_on(frame, parts.height)
         if not goes_on:
             self._sweep()
         walls = Walls.beside(field, frame, here[2] + parts.height, (-reach, span + reach), reach, self.options.spacing)
         of_dexels = walls.tops.copy()
         if goes_on:
             self._overlay(frame, walls)
-            if self.pending != move:
+            if move not in self.pending:
                 self._sweep()
         if not np.any(walls.tops > NOTHING):
             self.rest()
             return None
-        step = 2.0 * np.pi / speed / self.options.steps
         carrier = self.carriers(move, frame)
-        fresh = start_of(carrier, cut, step, since + start * length / feed, self._angle(frame))
-        went = fresh if self.went is None else self._gone_on(fresh, carrier, frame)
-        x = feed * step * np.arange(1, int(span / (feed * step)) + 1)
-        if not x.size:
+        steps = int(min(max(self.options.steps, np.ceil(_WAVE * carrier.fastest / speed)), _MOST_STEPS))
+        steps = -(-steps // self.alike) * self.alike
+        if steps != self.steps or self.went is None:
+            self.steps, self.rest_of_turn, self.since = steps, np.empty((0, 10)), 0.0
+        step = 2.0 * np.pi / speed / steps
+        # the first instant is a whole step behind the last one of the move before
+        first = step - min(self.since, step)
+        taken = span / feed
+        count = int((taken - first) / step + 1e-9) + 1 if taken >= first else 0
+        if not count:
+            self.since += taken
             return None
+        self.since = taken - first - (count - 1) * step
+        fresh = start_of(carrier, cut, step, since + start * length / feed + first - step, self._angle(frame))
+        went = fresh if self.went is None else self._gone_on(fresh, carrier, frame)
+        x = feed * (first + step * np.arange(count))
         laid = walls.tops.copy()
         found = march(went, carrier, cut, walls, np.column_stack([x, np.zeros_like(x)]))
         self.went, self.modes = found, carrier.modes
-        self.before = frame, walls, (walls.tops < laid) | (laid != of_dexels)
+        self.before = frame, walls, (walls.tops < laid) | (laid != of_dexels), cut
         return self._turns(move, found, frame, walls, cut, here, x)
+
+    @property
+    def _reach(self) -> float:
+        """As far beside the path as the tool comes, run-out and all [m]."""
+        return 1.2 * (self.sweep.solid.radius + float(np.max(np.abs(self.cutter.runout))))
+
+    def _told(self, move: int) -> str:
+        path = self.sweep.path
+        line = f"line {path.line[move + 1]}" if path.line[move + 1] else f"place {move + 2}"
+        return line
+
+    def _cut(self, frame: PathFrame, span: float, level: float, speed: float) -> Cut | None:
+        """The slices of the material that stands beside a part of the path; None where there is none as high as the edges."""
+        # what stands at the tool's own radius is the wall that it leaves
+        radius = self.sweep.solid.radius - 0.5 * float(self.sweep.field.cell[:2].max())
+        beside = self.sweep.field.heights_beside(frame.origin, frame.back(np.array([[span, 0.0]]))[0], radius, level)
+        if beside is None:
+            return None
+        bottom, top = beside[0] - level, min(beside[1] - level, self.sweep.solid.edge)
+        if top - bottom < _THIN:
+            return None
+        if self.before is not None:
+            old = self.before[3]
+            inside = bottom >= old.bottom - _THIN and top <= old.depth + _THIN and top - bottom > 0.5 * (old.depth - old.bottom)
+            if inside and old.spindle_speed == speed:
+                return old
+        slices = int(np.clip(np.ceil((top - bottom) / _SLICE), _FEWEST, _MOST))
+        return Cut(self.cutter, self.coefficients, top, speed, slices, bottom if bottom > _THIN else 0.0)
 
     def _angle(self, frame: PathFrame) -> float:
         """Where tooth 1 stands: angles count from the normal of the frame, clockwise."""
@@ -260,7 +310,7 @@ class _Marcher:
             fresh = replace(fresh, swing=before.swing)
         elif carrier.modes is not None:
             # other modes stand where the mean force of the last turn holds them
-            mean = before.force[-self.options.steps :].mean(axis=0)
+            mean = before.force[-self.steps :].mean(axis=0)
             mean[:2] = turn @ mean[:2]
             fresh = replace(fresh, swing=-(carrier.modes.inputs @ mean) / carrier.modes.pole)
         if before.trail.shape == fresh.trail.shape:
@@ -270,17 +320,17 @@ class _Marcher:
         force[:, :2] = force[:, :2] @ turn.T
         return replace(fresh, force=force, lost=before.lost)
 
-    def _goes_on(self, frame: PathFrame, slices: int) -> bool:
+    def _goes_on(self, frame: PathFrame, heights: FloatArray) -> bool:
         """Whether teeth find what teeth left on the move before."""
         if self.before is None:
             return False
         bend = np.angle(np.exp(1j * (frame.angle - self.before[0].angle)))
-        return bool(abs(bend) <= _BEND) and self.before[1].tops.shape[1] == slices
+        return bool(abs(bend) <= _BEND) and np.array_equal(self.before[3].parts.height, heights)
 
     def _overlay(self, frame: PathFrame, walls: Walls) -> None:
         """Take what teeth left on the move before in place of what the dexels have."""
         assert self.before is not None
-        old, left, taken = self.before
+        old, left, taken, _ = self.before
         for k in range(walls.tops.shape[1]):
             pieces = []
             for side, sign in ((0, 1.0), (1, -1.0)):
@@ -300,7 +350,7 @@ class _Marcher:
         into[:2, :2] = frame.turn
         places = np.column_stack([frame.back(np.column_stack([x, np.zeros_like(x)])), np.full(x.size, here[2])])
         rows = np.concatenate([self.rest_of_turn, np.column_stack([found.time, places, found.force @ into, found.tip @ into])])
-        steps = self.options.steps
+        steps = self.steps
         count = len(rows) // steps
         self.rest_of_turn = rows[count * steps :]
         turns = rows[: count * steps].reshape(count, steps, 10)
@@ -313,6 +363,7 @@ class _Marcher:
             np.linalg.norm(across, axis=2).max(axis=1, initial=0.0),
             mean[:, 7:],
             turns[:, 0, 7:9],
+            np.linalg.norm(np.diff(turns[:, :: steps // self.alike, 7:9], axis=1), axis=2).max(axis=1, initial=0.0),
             np.linalg.norm(np.ptp(turns[..., 7:9], axis=1), axis=1),
             frame,
             walls,

@@ -12,6 +12,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement, EngagementMap
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
@@ -76,7 +77,11 @@ def stations_along(machine: TipSource, tooling: Tooling, path: ToolPath) -> Call
 
     def station(move: int) -> Station:
         at = int(which[move])
-        return Station(posed[at], turns[at] - feed_turn(robot, postures[at], ways[move]))
+        axis, way = path.axes[first[at]], ways[move]
+        across = way - axis * (axis @ way)
+        # straight along its axis a tool has no feed direction
+        plunges = np.linalg.norm(across) < 1e-6 * np.linalg.norm(way)
+        return Station(posed[at], 0.0 if plunges else turns[at] - feed_turn(robot, postures[at], way))
 
     return station
 
@@ -93,8 +98,10 @@ class CutsAlong:
     margin : array, shape (k,)
         How many times as deep as it is a cut becomes unstable, where it is the same all along the edge; else how many times stronger the
         material would have to be. Below 1 it chatters; `FARTHEST` says as much or more.
+    of_strength : array of bool, shape (k,)
+        Where the margin is the material's: of cuts that change along the edge.
     margin_low : array, shape (k,)
-        What 95 % of the drawn machines reach; the margin itself where none are drawn.
+        What 95 % of the drawn machines reach; the margin itself where none are drawn, and of cuts that change along the edge.
     chatter_frequency : array, shape (k,) [rad/s]
         At the limit.
     mean_force : array, shape (k, 3) [N]
@@ -114,6 +121,7 @@ class CutsAlong:
     speed: FloatArray
     feed_per_tooth: FloatArray
     margin: FloatArray
+    of_strength: np.ndarray
     margin_low: FloatArray
     chatter_frequency: FloatArray
     mean_force: FloatArray
@@ -125,8 +133,12 @@ class CutsAlong:
 
     @property
     def limit(self) -> FloatArray:
-        """Depth at which each cut would become unstable, shape (k,) [m]: margin times depth; infinite beyond `FARTHEST`."""
-        return np.where(self.margin >= FARTHEST, np.inf, self.margin * self.depth)
+        """Depth at which each cut would become unstable, shape (k,) [m]: margin times depth; infinite beyond `FARTHEST`.
+
+        nan of cuts that change along the edge: deeper they would be other cuts.
+        """
+        limit = np.where(self.margin >= FARTHEST, np.inf, self.margin * self.depth)
+        return np.where(self.of_strength, np.nan, limit)
 
     @property
     def cutting(self) -> np.ndarray:
@@ -165,20 +177,21 @@ def cuts_along(
         If the path has no feed, or nobody told a spindle speed, on a move that cuts.
     """
     moves = len(path) - 1
-    speed = np.where(path.speed[1:] > 0.0, path.speed[1:], change.speeds[0] if change.speeds.size == 1 else np.nan)
+    told = path.speed[1:]
+    speed = np.where(np.isnan(told), change.speeds[0], told) if change.speeds.size == 1 else told
     teeth = change.tooling.cutter.teeth
     rows = {name: np.full(moves, np.nan) for name in ("depth", "feed", "margin", "low", "chatter", "peak", "deflection", "error")}
-    mean = np.full((moves, 3), np.nan)
+    mean, of_strength = np.full((moves, 3), np.nan), np.zeros(moves, dtype=bool)
     groups: dict[tuple[object, ...], list[int]] = {}
     cuts: dict[tuple[object, ...], tuple[Station, AnyEngagement, float]] = {}
     for move in range(moves):
         found = engaged.at(move)
         if found is None or not path.cutting[move] or not float(found.heights[-1]) > 0.0:
             continue
-        if not np.isfinite(speed[move]) or not path.feed[move + 1] > 0.0:
-            lacking = "feed" if np.isfinite(speed[move]) else "spindle speed"
+        if not speed[move] > 0.0 or not path.feed[move + 1] > 0.0:
+            lacking = "feed" if speed[move] > 0.0 else "spindle speed"
             raise InputError(lacking, f"none on the move to {_told(path, move)}", f"a {lacking} on every move that cuts")
-        engagement, depth = plain(found)
+        engagement, depth = plain(found, change.tooling.cutter)
         if isinstance(engagement, Engagement) and engagement.immersion < _GRAZING:
             continue
         station = stations(move)
@@ -220,6 +233,7 @@ def cuts_along(
         ):
             rows[name][which] = value
         mean[which] = answer.mean
+        of_strength[which] = not isinstance(engagement, Engagement)
         # how thin a chip is the path says, and not whoever gave it
         warnings += [each for each in answer.warnings if not each.startswith("radial immersion")]
         if progress is not None:
@@ -229,6 +243,7 @@ def cuts_along(
         np.where(np.isnan(rows["depth"]), np.nan, speed),
         rows["feed"],
         rows["margin"],
+        of_strength,
         rows["low"],
         rows["chatter"],
         mean,
@@ -248,18 +263,18 @@ def _alike_once(warnings: Sequence[str]) -> tuple[str, ...]:
     return tuple(first.values())
 
 
-def plain(found: EngagementMap) -> tuple[AnyEngagement, float]:
+def plain(found: EngagementMap, cutter: Cutter) -> tuple[AnyEngagement, float]:
     """Return an engagement as plain as it is, and the depth that it is about [m].
 
-    One arc in front of the tool that is the same at all heights, to `SAME_ANGLE`, is an `Engagement` over the height of the material; all
-    else stays a map, up to its top.
+    One arc in front of the tool that is the same at all heights, to `SAME_ANGLE`, is an `Engagement` over the height of the material, which
+    begins at the tip unless the cutter is a cylinder; all else stays a map, up to its top.
     """
     # arcs that end within a degree of 0 or 180 end there: a wall is left
     near, z = 0.5 * SAME_ANGLE, found.z
     start = np.where(found.start < near, 0.0, found.start)
     end = np.where(np.abs(found.end - np.pi) < near, np.pi, found.end)
     start, end = np.minimum(start, end), end
-    alone = np.unique(z).size == z.size and found.feed_rise == 0.0
+    alone = np.unique(z).size == z.size and found.feed_rise == 0.0 and (cutter.is_cylinder or z[0] < 1e-6)
     if alone and np.ptp(start) <= SAME_ANGLE and np.ptp(end) <= SAME_ANGLE:
         entry, leave = float(np.mean(start)), min(float(np.mean(end)), np.pi)
         if leave > entry:
@@ -367,10 +382,15 @@ def described(found: CutsAlong, path: ToolPath) -> str:
     cutting = np.flatnonzero(found.cutting)
     if not cutting.size:
         return "nothing is cut"
-    worst = int(cutting[np.argmin(found.margin_low[cutting])])
+    worst = int(cutting[np.argmin(found.margin[cutting])])
     speed, depth = to_rpm(float(found.speed[worst])), 1e3 * found.depth[worst]
-    chatters = int(np.count_nonzero(found.margin_low[cutting] < 1.0))
+    chatters = int(np.count_nonzero(found.margin[cutting] < 1.0))
+    doubtful = int(np.count_nonzero(found.margin_low[cutting] < 1.0)) - chatters
     where = f"{speed:.0f} rev/min, {depth:.2f} mm deep, on the move to {_told(path, worst)}"
+    could = "material could be {:.2f} times as strong there" if found.of_strength[worst] else "could be {:.2f} times as deep"
+    could = could.format(found.margin[worst])
+    may = f"; {doubtful} more may, as far as the machine is known" if doubtful else ""
     if chatters:
-        return f"{chatters} of {cutting.size} moves chatter; the worst could be {found.margin_low[worst]:.2f} times as deep: {where}"
-    return f"no move chatters; the nearest to it could be {found.margin_low[worst]:.2f} times as deep: {where}"
+        return f"{chatters} of {cutting.size} moves chatter{may}; the worst {could}: {where}"
+    first = f"{doubtful} of {cutting.size} moves may chatter, as far as the machine is known" if doubtful else "no move chatters"
+    return f"{first}; the nearest to it {could}: {where}"

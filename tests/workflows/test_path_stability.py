@@ -8,6 +8,7 @@ import pytest
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_lines
+from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.errors import InputError
@@ -105,26 +106,35 @@ def test_two_layers_are_a_map_whose_margin_lies_between_those_of_its_layers() ->
     removal = remove_along(TOOL, path, field_of(TOOL, (np.array([0.0, -0.02, -0.01]), np.array([0.03, 0.02, 0.0])), cell=0.25e-3), 1e-3)
     change = question()
     found = cuts_along(change, removal.path, removal.engagement, stations_along(change.machine, TOOL, removal.path))
-    engagement, height = plain(removal.engagement.at(len(removal.path) - 3))
+    engagement, height = plain(removal.engagement.at(len(removal.path) - 3), TOOL.cutter)
     assert isinstance(engagement, EngagementMap)
     assert height == pytest.approx(depth)
     # more than a slot of this depth, less than a slot of half of it
     assert limit / depth < found.margin[-3] < 2.0 * limit / depth
+    # deeper it would be another cut: how strong the material may be is told, and no limit
+    assert found.of_strength[-3]
+    assert np.isnan(found.limit[-3])
 
 
 def test_engagements_are_as_plain_as_they_are() -> None:
     z = np.array([0.0, 0.001, 0.002])
     told = np.radians([[0.4, 179.3], [0.6, 179.6], [0.2, 179.1]])
-    engagement, depth = plain(EngagementMap(z, *told.T))
+    engagement, depth = plain(EngagementMap(z, *told.T), TOOL.cutter)
     assert engagement == Engagement(0.0, np.pi)
     assert depth == 0.002
     entry, leave = np.radians([60.0, 130.0])
-    engagement, _ = plain(EngagementMap(z, np.full(3, entry), np.full(3, leave)))
+    engagement, _ = plain(EngagementMap(z, np.full(3, entry), np.full(3, leave)), TOOL.cutter)
     assert (engagement.entry, engagement.exit) == pytest.approx((entry, leave))
-    ramp, _ = plain(EngagementMap(z, np.full(3, entry), np.full(3, leave), feed_rise=0.1))
+    ramp, _ = plain(EngagementMap(z, np.full(3, entry), np.full(3, leave), feed_rise=0.1), TOOL.cutter)
     assert isinstance(ramp, EngagementMap)
-    changing, _ = plain(EngagementMap(z, np.full(3, entry), np.radians([100.0, 110.0, 120.0])))
+    changing, _ = plain(EngagementMap(z, np.full(3, entry), np.radians([100.0, 110.0, 120.0])), TOOL.cutter)
     assert isinstance(changing, EngagementMap)
+    # the height above the tip says nothing of a cylinder and all of a ball
+    high = EngagementMap(z + 0.006, np.full(3, entry), np.full(3, leave))
+    assert isinstance(plain(high, TOOL.cutter)[0], Engagement)
+    engagement, depth = plain(high, Cutter(2, 0.01, profile=Profile.ball(0.01)))
+    assert isinstance(engagement, EngagementMap)
+    assert depth == pytest.approx(0.008)
 
 
 def test_what_a_path_must_tell() -> None:
@@ -136,6 +146,16 @@ def test_what_a_path_must_tell() -> None:
     stations = stations_along(silent.machine, TOOL, removal.path)
     with pytest.raises(InputError, match="spindle speed"):
         cuts_along(silent, removal.path, removal.engagement, stations)
+
+
+def test_a_standing_spindle_is_named_and_never_replaced() -> None:
+    path = ToolPath(
+        np.array([[-0.006, 0.0, -0.001], [0.015, 0.0, -0.001]]), feed=np.full(2, FEED), speed=np.zeros(2), line=np.array([1, 9])
+    )
+    removal = remove_along(TOOL, path, field_of(TOOL, (np.array([0.0, -0.01, -0.01]), np.array([0.03, 0.01, 0.0]))), 1e-3)
+    stations = stations_along(machine(), TOOL, removal.path)
+    with pytest.raises(InputError, match=r"spindle speed.*line 9"):
+        cuts_along(question(), removal.path, removal.engagement, stations)
 
 
 def test_a_path_in_the_air_cuts_nothing() -> None:
