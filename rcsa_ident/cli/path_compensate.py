@@ -139,7 +139,11 @@ def compensate(
     kept, led = kept_words(path) if path.suffix.lower() in PROGRAMS else ([], [])
     if led:
         lines = ", ".join(map(str, led[:5])) + (f" and {len(led) - 5} further" if len(led) > 5 else "")
-        warnings.append(f"G28, G30 or G53 in line {lines}: nobody knows where they lead, they are not in the written path")
+        height = 1e3 * told.places[:, 2].max()
+        warnings.append(
+            f"G28, G30 or G53 in line {lines}: nobody knows where they lead; Z stands at {height:g} mm from there on, its highest, "
+            "X and Y where they were, until they are told next"
+        )
     write_tool_path(out, found.path, decimals, kept)
     if joints is not None and found.postures is not None:
         write_joints(joints, along.times, found.postures)

@@ -111,7 +111,7 @@ def test_a_program_keeps_what_its_machine_needs(tmp_path):
     lines = out.read_text().splitlines()
     order = [lines.index(each) for each in ("M3 S8000", "M6 T3", "G43 H3", "M8", "M9", "M30")]
     assert order == sorted(order)
-    assert any("G53 in line 10:" in each for each in answer["warnings"])
+    assert any("G53 in line 10:" in each and "at 900 mm" in each for each in answer["warnings"])
 
 
 def test_an_arm_without_masses_is_taken_at_rest(program, tmp_path):
