@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from enum import StrEnum
 from pathlib import Path
@@ -26,6 +27,17 @@ if TYPE_CHECKING:
 _BAND = (5.0, 95.0)
 #: How far forces may end from the path's end without a word, as a share of its time.
 _SAME_TIME = 0.02
+#: Parameters that a machine has no joints and drives for, and their options.
+_OF_ARMS = {
+    "posture": "--posture",
+    "joints": "--joints",
+    "method": "--method",
+    "passes": "--passes",
+    "blend": "--blend-ms",
+    "lag": "--lag-ms",
+    "weight": "--no-weight",
+    "joints_only": "--joints-only",
+}
 
 
 class MethodName(StrEnum):
@@ -67,7 +79,10 @@ def compensate(
         typer.Option(metavar="'Q1 Q2 ...'", help="Of an arm: angles near those of the first place, degrees.", show_default=False),
     ] = None,
     method: Annotated[
-        MethodName, typer.Option(help="Springs answer the torques of the ideal motion, or the simulated deviation is taken off.")
+        MethodName,
+        typer.Option(
+            help="Of an arm: springs answer the torques of the ideal motion, or the simulated deviation is taken off; of a machine, always."
+        ),
     ] = MethodName.ideal_force,
     passes: Annotated[int, typer.Option(help="Times that mirror simulates and takes off.", min=1, max=20)] = 1,
     force_axes: Annotated[
@@ -103,10 +118,12 @@ def compensate(
     force = _forces(forces, told, force_axes).low_passed(positive("--cutoff-hz", cutoff, "Hz"))
     most, tool = 1e-3 * positive("--largest-mm", largest, "mm"), read_tooling(tooling)
     stages, arm = Stages(quiet=json_), is_robot(machine)
+    if not arm:
+        _refuse_joints(
+            posture=posture, joints=joints, method=method, passes=passes, blend=blend, lag=lag, weight=weight, joints_only=joints_only
+        )
     if joints is not None:
         writable(joints, "--joints")
-        if not arm:
-            raise InputError("--joints", str(machine), "an arm: a machine has no joints to turn")
     warnings = _other_times(force, told)
     with stages.stage("compensation"):
         if arm:
@@ -117,18 +134,29 @@ def compensate(
                 machine, tool, along, force, posture, (method, passes), controller, weight, joints_only, most, draws, seed
             )
         else:
-            if posture is not None:
-                raise InputError("--posture", posture, "none: a machine has no joints to turn")
             found, said = _on_machine(machine, tool, along, force, most, draws, seed)
         warnings += said
     kept, led = kept_words(path) if path.suffix.lower() in PROGRAMS else ([], [])
     if led:
         lines = ", ".join(map(str, led[:5])) + (f" and {len(led) - 5} further" if len(led) > 5 else "")
-        warnings.append(f"G28, G30 or G53 in line {lines}: nobody knows where they lead, they are not in the written path")
+        height = 1e3 * told.places[:, 2].max()
+        warnings.append(
+            f"G28, G30 or G53 in line {lines}: nobody knows where they lead; Z stands at {height:g} mm from there on, its highest, "
+            "X and Y where they were, until they are told next"
+        )
     write_tool_path(out, found.path, decimals, kept)
     if joints is not None and found.postures is not None:
         write_joints(joints, along.times, found.postures)
-    _tell(found, along, warnings, {"method": str(method), "seconds": stages.seconds, "out": str(out)}, joints, json_)
+    used = method if arm else MethodName.mirror
+    _tell(found, along, warnings, {"method": str(used), "seconds": stages.seconds, "out": str(out)}, joints, json_)
+
+
+def _refuse_joints(**given: Any) -> None:
+    """Refuse what was said of an arm, of parameters by their names, beside a machine."""
+    defaults = inspect.signature(compensate).parameters
+    for name, value in given.items():
+        if value != defaults[name].default:
+            raise InputError(_OF_ARMS[name], str(value), "an arm: a machine has no joints to turn, its deviation at rest is mirrored")
 
 
 def _controller(blend: float, lag: float | None) -> Controller:

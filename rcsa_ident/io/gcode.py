@@ -24,6 +24,8 @@ LARGEST_PROGRAM = 100 * MEGABYTE
 #: Places that a program may lead to, chords of arcs counted; and lines that it may have.
 MOST_PLACES = 2_000_000
 _INCH = 25.4
+#: Heights that differ by less are one [mm]: corrections lift places.
+_LEVEL = 1.0
 #: M words that end a program, and those that act behind the move of their line.
 _ENDS, _BEHIND = (2, 30), (0, 1, 5, 9, 60)
 
@@ -35,8 +37,10 @@ def read_gcode(path: str | Path, tolerance: float = 1e-6) -> ToolPath:
     """Return the path of a program's tool tip.
 
     G0 to G3 (arcs by I, J, K or R, full circles, helices) in the planes of G17 to G19, millimetres or inches, absolute or incremental,
-    with F, S, T, M3 to M6. A program begins at its zero where its first feed move needs a place that nobody told. G28, G30 and G53 lead
-    where nobody knows: the axes stand from there on where they are told next. M2 and M30 end it.
+    with F, S, T, M3 to M6. M2 and M30 end it. The first place is where all axes are told, whatever moved before; a program begins at its
+    zero where its first feed move needs a place that nobody told. G28, G30 and G53 lead where nobody knows: Z stands from there on at the
+    highest that the program tells anywhere, X and Y where they were, until they are told next; a rapid move that tells Z again goes across
+    first, then down.
 
     Parameters
     ----------
@@ -150,8 +154,9 @@ class _Program:
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
         self.at = [math.nan] * 3
-        # which axes G28 or G53 brought where nobody knows, and in which line
+        # which axes G28 or G53 brought where nobody knows, and in which line; Z is no number there until the highest one is known
         self.lost: dict[int, int] = {}
+        self.highest = -math.inf
         self.motion: float | None = None
         self.plane, self.unit = 17.0, 1.0
         self.absolute, self.absolute_centres = True, False
@@ -221,7 +226,9 @@ class _Program:
             self._begin(axes, arc, number)
         target = self._target(axes)
         if self.motion == 0:
-            # a place is one when all its axes are told; behind G28 they will be
+            if self.lines and 2 in self.lost and 2 in axes:
+                self._add([*target[:2], math.nan], RAPID, number)
+            # before all axes are told there is no place
             if self.lines or not any(map(math.isnan, target)):
                 self._add(target, RAPID, number)
         elif arc:
@@ -238,7 +245,8 @@ class _Program:
             raise InputError(f"{_AXES[i]}", f"no place since line {since} led where nobody knows", f"G0 {_AXES[i]} before the tool feeds")
         if self.lines:
             return
-        if arc or any(not math.isnan(v) for v in self.at) or len(axes) < 3 or not self.absolute:
+        leaves = any(not math.isnan(v) and v != axes.get(i) for i, v in enumerate(self.at))
+        if arc or leaves or len(axes) < 3 or not self.absolute:
             self.at = [0.0 if math.isnan(v) else v for v in self.at]
             self._add(self.at, RAPID, number)
 
@@ -251,6 +259,8 @@ class _Program:
                 raise InputError(_AXES[i], f"a step from where line {self.lost[i]} led to", "a place, by G90")
             else:
                 target[i] = value + (0.0 if math.isnan(target[i]) else target[i])
+        if 2 in axes:
+            self.highest = max(self.highest, target[2])
         return target
 
     def _arc(self, target: list[float], offsets: dict[int, float], radius: float | None, number: int) -> None:
@@ -281,19 +291,20 @@ class _Program:
 
     def _home(self, axes: dict[int, float], number: int) -> None:
         """G28 and G30: by way of a place to the reference point of the axes that are told, of all where none is."""
-        if axes:
+        if axes and self.lines:
             way = self._target(axes)
             if way != self.at and not any(map(math.isnan, way)):
                 self._add(way, RAPID, number)
-            self.at = way
+                self.at = way
         self._leave(axes or dict.fromkeys(range(3), 0.0), number)
 
     def _leave(self, axes: dict[int, float], number: int) -> None:
-        """Go where nobody knows by the axes that are told."""
+        """Go where nobody knows by the axes that are told: Z up, X and Y stay for want of a place."""
         for i in axes:
-            self.at[i] = math.nan
+            if i == 2 or not self.lines:
+                self.at[i] = math.nan
             self.lost[i] = number
-        if self.lines and axes:
+        if self.lines and 2 in axes:
             self._add(self.at, RAPID, number)
 
     def _check(self, count: int) -> None:
@@ -311,28 +322,29 @@ class _Program:
         self.lines.append(number)
 
     def path(self, where: str) -> ToolPath:
-        """Return the places; axes that were led where nobody knows stand where they are told next."""
-        places = np.array(self.places).reshape(-1, 3)
-        known = ~np.isnan(places)
-        kept = len(places) - int(np.argmax(known[::-1].all(axis=1))) if known.all(axis=1).any() else 0
-        if not kept:
+        """Return the places; where Z was led where nobody knows it stands at the highest that is told."""
+        if not self.lines:
             raise InputError("program", "no move to a place", "one or more, with X, Y and Z", where)
-        places = places[:kept]
-        for column, told in zip(places.T, known[:kept].T, strict=True):
-            rows = np.flatnonzero(told)
-            column[:] = column[rows[np.searchsorted(rows, np.arange(kept))]]
+        places = np.array(self.places).reshape(-1, 3)
+        led = np.isnan(places[:, 2])
+        places[led, 2] = max(self.highest, np.nanmax(places[:, 2]))
+        kept = ~led
+        kept[1:] |= np.any(np.diff(places, axis=0) != 0.0, axis=1)
         tools = np.array(self.tools) if self.changes else np.full(len(self.lines), self.selected)
         return ToolPath(
-            1e-3 * places,
-            feed=np.array(self.feeds)[:kept] / 6e4,
-            speed=from_rpm(np.array(self.speeds)[:kept]),
-            tool=tools[:kept],
-            line=np.array(self.lines)[:kept],
+            1e-3 * places[kept],
+            feed=np.array(self.feeds)[kept] / 6e4,
+            speed=from_rpm(np.array(self.speeds)[kept]),
+            tool=tools[kept],
+            line=np.array(self.lines)[kept],
         )
 
 
 def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4, kept: Sequence[Kept] = ()) -> None:
     """Write a path as a program in millimetres, absolute, feeds per minute; `read_gcode` gives it back, line numbers aside.
+
+    Nobody knows where the tool stands before: it goes to the first place by Z, then across, where the path is nowhere higher; otherwise
+    across as high as it stands, then by Z.
 
     Parameters
     ----------
@@ -361,7 +373,7 @@ def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4, kept: 
     lines = ["%", "G21 G90 G94 G17"]
     speed, feed, tool, further = math.nan, math.nan, 0, list(kept)
     table = zip(places.tolist(), feeds.tolist(), speeds.tolist(), tool_path.tool.tolist(), tool_path.line.tolist(), strict=True)
-    for place, f, s, t, line in table:
+    for k, (place, f, s, t, line) in enumerate(table):
         while further and (further[0].line, further[0].after) < (line, True):
             lines.append(further.pop(0).text)
         if t != tool and not kept:
@@ -374,6 +386,8 @@ def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4, kept: 
         if f not in (feed, math.inf) and not math.isnan(f):
             word, feed = f" F{_told(f)}", f
         x, y, z = (f"{value:.{decimals}f}" for value in place)
+        if not k:
+            lines.append(f"G0 Z{z}" if place[2] > places[:, 2].max() - _LEVEL else f"G0 X{x} Y{y}")
         lines.append(f"{'G0' if f == math.inf else 'G1'} X{x} Y{y} Z{z}{word}")
     write_text(path, "\n".join([*lines, *(each.text for each in further), "M30", "%"]) + "\n")
 

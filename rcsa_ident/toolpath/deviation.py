@@ -56,9 +56,7 @@ class Deviation:
             if np.shape(places) != path.places.shape:
                 raise InputError(name, np.shape(places), f"a place for each of the path's, shape {path.places.shape}")
         along = _directions(path)
-        cutting = np.zeros(len(path), dtype=bool)
-        cutting[1:] |= path.cutting
-        cutting[:-1] |= path.cutting
+        cutting = path.beside_cutting
         straight = np.linalg.norm(_across(followed - path.places, along), axis=1) < _STRAIGHT
         return cls(frozen(_across(tips - path.places, along)), cutting & straight, cutting & ~straight)
 

@@ -18,6 +18,8 @@ _ORDER = 2
 _PER_PERIOD, _MOST = 50.0, 10_000_000
 #: A force's place may be that far from the path [m]: what the tool's own deviation is, and more.
 _NEAR = 5e-3
+#: Rounding of instants makes steps no shorter than by that share.
+_ROUNDED = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +56,8 @@ class ForceAlongPath:
     def low_passed(self, cutoff: float = CUTOFF) -> ForceAlongPath:
         """Return the forces without what is faster than a frequency [Hz], not delayed; as they are where they hold nothing faster."""
         positive("cutoff", cutoff, "Hz")
-        if self.time.size < 3 or 0.5 / np.min(np.diff(self.time)) <= cutoff:
+        # a filter's cutoff lies below half the rate
+        if self.time.size < 3 or 0.5 / np.min(np.diff(self.time)) <= cutoff * (1.0 + _ROUNDED):
             return self
         span = self.time[-1] - self.time[0]
         step = max(np.min(np.diff(self.time)), 1.0 / (_PER_PERIOD * cutoff))

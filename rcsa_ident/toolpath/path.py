@@ -93,6 +93,12 @@ class ToolPath:
         return ~np.isinf(self.feed[1:])
 
     @property
+    def beside_cutting(self) -> np.ndarray:
+        """At which places a move at a feed begins or ends, shape (k,)."""
+        cutting = self.cutting
+        return np.append(cutting, False) | np.append(False, cutting)
+
+    @property
     def times(self) -> FloatArray:
         """When the tool is at each place, shape (k,) [s]: corners are not slowed down for, rapid moves take no time.
 

@@ -59,9 +59,7 @@ def compensate_machine(
     >>> found.path.places[:, 1].round(9).tolist(), round(1e3 * found.before.rms, 6), found.after.rms
     ([-0.0001, -0.0001], 0.1, 0.0)
     """
-    cutting = np.zeros(len(path), dtype=bool)
-    cutting[1:] |= path.cutting
-    cutting[:-1] |= path.cutting
+    cutting = path.beside_cutting
     forces = np.where(cutting[:, None], force.at(path.times), 0.0)
     commanded = mirrored(path.places, lambda places: places + forces @ compliance.T)
     correction, saturated = limited(commanded - path.places, largest)

@@ -111,7 +111,7 @@ def test_a_program_keeps_what_its_machine_needs(tmp_path):
     lines = out.read_text().splitlines()
     order = [lines.index(each) for each in ("M3 S8000", "M6 T3", "G43 H3", "M8", "M9", "M30")]
     assert order == sorted(order)
-    assert any("G53 in line 10:" in each for each in answer["warnings"])
+    assert any("G53 in line 10:" in each and "at 900 mm" in each for each in answer["warnings"])
 
 
 def test_an_arm_without_masses_is_taken_at_rest(program, tmp_path):
@@ -182,6 +182,7 @@ def test_a_machine_is_compensated_by_what_its_tip_gives_way(program, result_file
     assert answer["after"]["straight_rms_mm"] == pytest.approx(0.0, abs=1e-12)
     assert 1e-3 < answer["before"]["straight_rms_mm"] < 0.2
     assert answer["band"]["draws"] == 8
+    assert answer["method"] == "mirror"
     # cuts from 300 Hz on tell little of what is at rest
     assert 1e-3 < answer["band"]["straight_rms_mm"][0] < answer["band"]["straight_rms_mm"][1] < 0.2
     assert any("along Z" in each for each in answer["warnings"])
@@ -223,7 +224,19 @@ def test_arms_have_postures_and_machines_have_none(program, result_file, tmp_pat
     assert "--posture" in run(KR210, TOOL, program, *forces, *out).output
     tooling = result_file.parent / "T1.toml"
     assert "--posture" in run(result_file, tooling, program, *forces, *out, *NEAR).output
-    assert "--joints" in run(result_file, tooling, program, *forces, *out, "--joints", tmp_path / "J.csv").output
+    for option in (
+        ("--joints", tmp_path / "J.csv"),
+        ("--method", "mirror"),
+        ("--passes", 2),
+        ("--blend-ms", 50),
+        ("--lag-ms", 20),
+        ("--no-weight",),
+        ("--joints-only",),
+    ):
+        refused = run(result_file, tooling, program, *forces, *out, *option)
+        assert refused.exit_code == 2, refused.output
+        assert f"{option[0]}: found" in refused.output
+        assert "a machine has no joints" in refused.output
     far = tmp_path / "FAR.nc"
     far.write_text("G0 X9000 Y0 Z0\nG1 X9010 F100\n")
     assert "reaches" in run(KR210, TOOL, far, *forces, *out, *NEAR).output

@@ -78,9 +78,16 @@ def test_inches():
         ("M98.5\nG1 X1", [[1.0, 0.0, 0.0]]),
         ("G1 X1\nM30\nX2", [[1.0, 0.0, 0.0]]),
         ("G1 X1\n%\nX2", [[1.0, 0.0, 0.0]]),
-        # a retracted tool stands where it is told next, before it goes aside
+        # a retracted tool stands at the highest that is told, before it goes aside
         ("G1 X1 Z-2\nG91 G28 Z0\nG90 G0 X5\nZ9", [[1.0, 0.0, -2.0], [1.0, 0.0, 9.0], [5.0, 0.0, 9.0], [5.0, 0.0, 9.0]]),
+        ("G0 Z9\nG1 Z-2\nG0 G53 Z0\nG0 X5\nZ-2", [[0, 0, 9], [0, 0, -2], [0, 0, 9], [5, 0, 9], [5, 0, -2]]),
+        # told again in one line with the others: across, then down
+        ("G0 Z9\nG1 Z-2\nG91 G30 Z0\nG90 G0 X5 Z-2", [[0, 0, 9], [0, 0, -2], [0, 0, 9], [5, 0, 9], [5, 0, -2]]),
+        # nothing else is told behind it
+        ("G0 Z9\nG1 X1 Z-2\nG28\nM30", [[0, 0, 9], [1, 0, -2], [1, 0, 9]]),
         ("G1 X1\nG0 G53 Z0", [[1.0, 0.0, 0.0]]),
+        # X and Y stay where they were until they are told
+        ("G0 Z9\nG1 X1 Y1 F60\nG53 G0 X0 Y0\nG0 Y5\nX7", [[0, 0, 9], [1, 1, 9], [1, 5, 9], [7, 5, 9]]),
     ],
 )
 def test_ways_of_writing(text, expected):
@@ -92,6 +99,86 @@ def test_a_program_begins_at_its_zero():
     # one that says where it begins does not
     assert len(gcode_of("G1 X900 Y0 Z500 F60\nX901", "P.nc")) == 2
     assert (1e3 * gcode_of("G0 X1 Y1\nG0 Z5\nG1 Z0", "P.nc").places).round(9).tolist() == [[1, 1, 5], [1, 1, 0]]
+
+
+def test_before_all_axes_are_told_nothing_is_a_move():
+    for start in ("G0 Z50\nG0 X10 Y10", "G0 X90 Z70\nG91 G28 X0 Y0 Z0\nG90 G0 Z50\nX10 Y10", "G28 G90 X0 Y0 Z0\nG0 X10 Y10\nZ50"):
+        path = gcode_of(f"{start}\nG1 Z-1 F60", "P.nc")
+        assert (1e3 * path.places).round(9).tolist() == [[10, 10, 50], [10, 10, -1]]
+        assert path.feed[0] == RAPID
+    # a height that is told there counts among the highest
+    path = gcode_of("G0 Z70\nX10 Y10 Z50\nG1 Z-1 F60\nG28", "P.nc")
+    assert (1e3 * path.places[-1]).round(9).tolist() == [10, 10, 70]
+    # a feed move that leaves what was told begins there, one that tells all else does not
+    assert (1e3 * gcode_of("G0 Z5\nG1 X1 Y1 Z0 F60", "P.nc").places).round(9).tolist() == [[0, 0, 5], [1, 1, 0]]
+    assert (1e3 * gcode_of("G0 Z5\nG1 X1 Y1 Z5 F60", "P.nc").places).round(9).tolist() == [[1, 1, 5]]
+
+
+RETRACTED = """\
+G21 G90 T1 M6
+G0 X80 Y-20
+G0 Z50
+G1 Z-8 F600
+G1 Y60
+G91 G28 Z0
+G90
+T2 M6
+G0 X-20 Y-20
+G0 Z-8
+G1 X80
+G28
+M30
+"""
+
+
+def test_a_retract_by_home_stays_one(tmp_path):
+    """No rapid move of the written program goes across below the clearance, or down into the part but straight."""
+    source, out = tmp_path / "P.nc", tmp_path / "OUT.nc"
+    source.write_text(RETRACTED)
+    path = read_gcode(source)
+    kept, led = kept_words(source)
+    assert led == [6, 12]
+    assert (1e3 * path.places[2:]).round(9).tolist() == [
+        [80, 60, -8],
+        [80, 60, 50],
+        [-20, -20, 50],
+        [-20, -20, -8],
+        [80, -20, -8],
+        [80, -20, 50],
+    ]
+    for words in (kept, ()):
+        write_gcode(out, path, kept=words)
+        again = read_gcode(out)
+        same(again, path)
+        rapid = ~again.cutting
+        across = np.linalg.norm(again.moves[:, :2], axis=1) > 0.0
+        assert np.all(again.moves[rapid & across, 2] == 0.0)
+        assert np.all(again.places[:-1][rapid & across, 2] == 0.05)
+        written = out.read_text().splitlines()
+        assert written.index(next(each for each in written if "T2" in each)) > written.index("G0 X80.0000 Y60.0000 Z50.0000")
+
+
+@pytest.mark.parametrize(
+    ("height", "feed", "first"),
+    [
+        (50.0, RAPID, "G0 Z50.0000"),
+        (50.0, 0.01, "G0 Z50.0000"),
+        (50.0, np.nan, "G0 Z50.0000"),
+        # a correction lifts a place at a feed above it
+        (49.96, RAPID, "G0 Z49.9600"),
+        # one below the others: down there the way across is not known to be free
+        (-8.0, RAPID, "G0 X10.0000 Y20.0000"),
+        (-8.0, 0.01, "G0 X10.0000 Y20.0000"),
+    ],
+)
+def test_the_first_place_is_reached_by_straight_lines(tmp_path, height, feed, first):
+    file = tmp_path / "P.nc"
+    path = ToolPath(1e-3 * np.array([[10.0, 20.0, height], [30.0, 20.0, -8.0], [30.0, 20.0, 50.0]]), feed=[feed, 0.01, 0.01])
+    write_gcode(file, path)
+    lines = file.read_text().splitlines()
+    assert lines[2] == first
+    assert f" X10.0000 Y20.0000 Z{height:.4f}" in lines[3]
+    same(read_gcode(file), path)
 
 
 def test_the_tool_changes_by_m6_where_a_program_has_it():
@@ -331,7 +418,8 @@ def test_what_moves_nothing_is_kept_at_its_place(tmp_path):
     lines = (tmp_path / "P.nc").read_text().splitlines()
     order = [lines.index(each) for each in ("M6 T2", "M3 S8000", "G54", "M8", "G43 H2", "M9", "M5", "M30")]
     assert order == sorted(order)
-    assert lines[order[4] + 1].startswith("G0 X20.000000 Y20.000000 Z15")
+    assert lines[order[4] + 1] == "G0 Z15.000000"
+    assert lines[order[4] + 2].startswith("G0 X20.000000 Y20.000000 Z15")
     assert lines[order[5] - 1].startswith("G0")
 
 

@@ -38,6 +38,16 @@ def test_slow_forces_stay_as_they_are():
         slow.low_passed(0.0)
 
 
+@pytest.mark.parametrize("start", [0.0, 0.3, 100.0])
+def test_forces_at_twice_the_cutoff_hold_nothing_faster(start):
+    """Whatever rounding makes of their steps."""
+    time = start + np.arange(200) / 200.0
+    force = ForceAlongPath(time, np.ones((200, 3)))
+    assert force.low_passed(100.0) is force
+    filtered = force.low_passed(100.0 * (1.0 - 1e-5))
+    np.testing.assert_allclose(filtered.force, 1.0, rtol=1e-9)
+
+
 def test_on_all_moves_in_either_axes():
     path = ToolPath(np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0.1, 0.1, 0.05], [0, 0, 0.05]]), feed=[0.1, 0.1, 0.1, 0.1, RAPID])
     fixed = on_all_moves(path, np.array([1.0, 2.0, 3.0]))

@@ -16,6 +16,9 @@ def test_rapid_moves_take_no_time_and_cut_nothing() -> None:
     path = corner()
     assert path.cutting.tolist() == [False, True, True]
     assert path.times == pytest.approx([0.0, 0.0, 1.0, 2.0])
+    assert path.beside_cutting.tolist() == [False, True, True, True]
+    assert ToolPath(path.places, feed=[0.05, RAPID, 0.05, RAPID]).beside_cutting.tolist() == [False, True, True, False]
+    assert ToolPath(path.places[:1]).beside_cutting.tolist() == [False]
 
 
 def test_a_finer_path_goes_the_same_way() -> None:
