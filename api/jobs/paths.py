@@ -15,6 +15,13 @@ from api.work.pool import guarded
 from api.work.requests import MachineText, ToolingSource
 from rcsa_ident.errors import InputError
 
+#: What makes a job shorter, by its kind.
+_SHORTER = {
+    "removal": "a shorter one, places farther apart, larger cells",
+    "stability": "a shorter one, places farther apart, larger cells, no bands, zero-order",
+    "milling": "a shorter one, larger cells, fewer steps a turn",
+}
+
 
 def asked(machine: MachineText | None, called: str, tooling: ToolingSource, request: PathRequest) -> str:
     """Return the text of a job: machine, what answers call it, tooling and path as they are now."""
@@ -46,7 +53,7 @@ def carry(job: Job, context: JobContext, most: float) -> Outcome:
         context.progress(stage, done, total)
         if time.monotonic() - start > most:
             found = f"one that takes more than {most:g} s; {done} of {total} were done ({stage})"
-            raise InputError("path", found, "a shorter one, places farther apart, no bands, zero-order")
+            raise InputError("path", found, _SHORTER[request.kind])
 
     found = context.remember("path", partial(guarded, paths.cut, machine, tooling, request, told))
     answer = json.dumps({"machine": called, **json.loads(found["answer"])}, allow_nan=False)

@@ -18,7 +18,7 @@ from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.units import from_rpm
 
-Millimetre = Annotated[float, Field(gt=0.0, le=100.0)]
+Millimetre = Annotated[float, Field(ge=1e-6, le=100.0)]
 _SHOWN: dict[str, Any] = {"tooling": EXAMPLE, "block_mm": [0.0, 0.0, -20.0, 60.0, 40.0, 0.0]}
 
 
@@ -77,8 +77,8 @@ class RemovalQuery(Body):
             raise InputError("block_mm", self.block_mm, "the lower corner first: x, y and z of the second one are larger")
         cell, step = (None if each is None else 1e-3 * each for each in (self.cell_mm, self.step_mm))
         told = {
-            "speed": None, "cut": PathCut().spec(), "method": str(MethodName.ZERO_ORDER), "bands": False, "play": True, "turn_steps": 360,
-            "cutoff": 0.8e-3,
+            "speed": None, "cut": PathCut().spec(), "method": str(MethodName.ZERO_ORDER), "bands": False, "play": True, "weight": True,
+            "turn_steps": 360, "cutoff": 0.8e-3,
         }  # fmt: skip
         return PathRequest(kind, file, text, block, surface, cell, step, **(told | further))
 
@@ -113,11 +113,12 @@ class PathMillingQuery(RemovalQuery):
     spindle_speed_rpm: Annotated[Rpm | None, Field(description="Where the path has none.")] = None
     turn_steps: Annotated[int, Field(ge=60, le=20_000, description="Instants of a turn, at least.")] = 360
     play: bool = Field(True, description="With the play of a robot's drives.")
+    weight: bool = Field(True, description="Whether the arm's weight holds that play.")
     cutoff_mm: Annotated[float, Field(gt=0.0, le=25.0, description="Of the Gaussian filter (ISO 16610-21) for Ra, Rq and Rt.")] = 0.8
 
     def request(self, file: str, text: str, surface: str) -> PathRequest:
         """Return the query in SI."""
-        milled = {"turn_steps": self.turn_steps, "play": self.play, "cutoff": 1e-3 * self.cutoff_mm}
+        milled = {"turn_steps": self.turn_steps, "play": self.play, "weight": self.weight, "cutoff": 1e-3 * self.cutoff_mm}
         return self._request("milling", file, text, surface, speed=_speed(self.spindle_speed_rpm), cut=self.cut.spec(), **milled)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.toolpath.removal import made_by
+from rcsa_ident.toolpath.removal import surface_made_by
 from rcsa_ident.toolpath.solid import ToolSolid
 from rcsa_ident.workflows.path_milling import PathMilling
 
@@ -56,12 +56,9 @@ def part_of(field: DexelField, path: ToolPath, moves: np.ndarray, row: np.ndarra
 
     None where nothing is left.
     """
-    points, faces = field.mesh(MOST_TRIANGLES)
+    points, faces, made = surface_made_by(field, path, moves, radius, MOST_TRIANGLES)
     if not len(faces):
         return None
-    size = float(np.median(np.linalg.norm(points[faces[:, 1]] - points[faces[:, 0]], axis=1)))
-    near = 1.5 * max(size, float(field.cell.max()))
-    made = made_by(points[faces].mean(axis=1), path, moves, radius, near) if moves.size else np.full(len(faces), -1)
     rows = np.where(made >= 0, np.append(row, -1)[np.searchsorted(moves, made)], -1)
     return {"points_mm": (1e3 * points).round(_DECIMALS).ravel().tolist(), "triangles": faces.ravel().tolist(), "rows": rows.tolist()}
 

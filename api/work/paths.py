@@ -66,7 +66,7 @@ class PathRequest:
     cut : CutSpec
     method : str
         One of `stability.methods.METHODS`.
-    bands, play : bool
+    bands, play, weight : bool
     turn_steps : int
     cutoff : float [m]
     """
@@ -83,6 +83,7 @@ class PathRequest:
     method: str
     bands: bool
     play: bool
+    weight: bool
     turn_steps: int
     cutoff: float
 
@@ -270,7 +271,8 @@ def _milled(change: ToolChange, path: ToolPath, field: DexelField, request: Path
         field,
         request.turn_steps,
         request.play,
-        cutoff=request.cutoff,
+        request.weight,
+        request.cutoff,
         progress=lambda done, total: told("milling", done, total),
     )
     columns = milling_columns(found, path)

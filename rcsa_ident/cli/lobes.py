@@ -239,13 +239,13 @@ def tell_lobes(
     say(f"written: {out} ({found.spindle_speed.size} speeds, {stages.seconds['lobes']:.2f} s)")
 
 
-def check_plot(path: Path | None) -> None:
+def check_plot(path: Path | None, option: str = "--plot") -> None:
     """Refuse a figure that cannot be written before the work, not after it."""
     if path is None:
         return
     if path.suffix.lower() not in (".png", ".svg"):
-        raise InputError("--plot", f"suffix '{path.suffix}'", "a file that ends in .png or .svg", str(path))
-    writable(path, "--plot")
+        raise InputError(option, f"suffix '{path.suffix}'", "a file that ends in .png or .svg", str(path))
+    writable(path, option)
 
 
 def peaks_of(frequency: FloatArray, tip: UncertainReceptance, deviation: Deviation) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import subjects_of
+from rcsa_ident.cli.lobes import check_plot
 from rcsa_ident.cli.options import TipOptions, takes_groups
 from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
 from rcsa_ident.cli.robot import is_robot, posed_robot
@@ -81,9 +82,9 @@ def stability(
     from rcsa_ident.workflows.path_removal import field_of, remove_along
     from rcsa_ident.workflows.path_stability import cuts_along, described, stations_along
 
-    for written, option in ((out, "--out"), (plot, "--plot"), (plot_error, "--plot-error")):
-        if written is not None:
-            writable(written, option)
+    writable(out)
+    check_plot(plot)
+    check_plot(plot_error, "--plot-error")
     machine, tooling, path = _subjects(files, tip, cut.posture)
     change = _change(machine, tooling, cut, method, bands)
     field = field_of(tooling, *stock_of(cut.stock), metres("--cell-mm", cut.cell_mm))
@@ -95,7 +96,7 @@ def stability(
     way, cutting = removal.path, np.flatnonzero(found.cutting)
     write_columns(out, stability_columns(found, way, cutting))
     _plots(removal, tooling, found, plot, plot_error)
-    warnings = [*removal.warnings, *tooling.remarks, *machine.remarks, *found.warnings]
+    warnings = list(dict.fromkeys([*removal.warnings, *tooling.remarks, *machine.remarks, *found.warnings]))
     if json_:
         emit(_summary(found, way) | {"warnings": warnings, "seconds": stages.seconds, "out": str(out)})
         return
@@ -144,12 +145,13 @@ def mill(
     write_columns(out, milling_columns(found, path))
     if surface is not None:
         write_columns(surface, _surface_columns(found, path))
+    warnings = list(dict.fromkeys([*tooling.remarks, *machine.remarks, *found.warnings]))
     if json_:
-        emit(_mill_summary(found, path) | {"seconds": stages.seconds, "out": str(out)})
+        emit(_mill_summary(found, path) | {"warnings": warnings, "seconds": stages.seconds, "out": str(out)})
         return
     say(found.described(path))
-    for remark in found.warnings:
-        warn(remark)
+    for each in warnings:
+        warn(each)
     written = ", ".join(str(each) for each in (out, surface) if each is not None)
     say(f"written: {written} ({found.time.size} turns, {stages.seconds['milling']:.1f} s)")
 
@@ -227,7 +229,6 @@ def _mill_summary(found: PathMilling, path: ToolPath) -> dict[str, Any]:
         if rough is None
         else {"ra": 1e6 * rough.mean, "rq": 1e6 * rough.rms, "rt": 1e6 * rough.total, "cutoff_mm": 1e3 * rough.cutoff},
         "form_error_um": None if found.form_error is None else [1e6 * each for each in found.form_error],
-        "warnings": list(found.warnings),
     }
 
 

@@ -7,21 +7,22 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.toolpath.removal import made_by
+from rcsa_ident.toolpath.removal import surface_made_by
 
 #: Where one stands who looks at the part: azimuth from x, and elevation [rad].
 _AZIMUTH, _ELEVATION = np.radians(-60.0), np.radians(35.0)
 #: Pixels along the longer side of the shaded view.
 _PIXELS = 900
 _STEEL, _INK, _PATH = np.array([0.70, 0.76, 0.82]), "#1f2933", "#C8501A"
-#: Places that a path is drawn with, at most.
-_DRAWN = 5000
+#: Places that a path is drawn with, or pieces of one in colours of their own, at most; and triangles of a surface in colours.
+_DRAWN, _TRIANGLES = 5000, 200_000
 
 
 def part_figure(field: DexelField, path: ToolPath | None = None) -> Figure:
@@ -61,7 +62,7 @@ def coloured_part_figure(
         Of the moves; a surface that none of them made, or one without a value, is grey.
     label : str
     limits : tuple of float, optional
-        Of the colours; by default those of the values.
+        Of the colours, the lower one of what is worst; by default those of the values, of which the farthest from 0 is worst.
     reach : float [m]
         The tool's radius.
     """
@@ -71,25 +72,32 @@ def coloured_part_figure(
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(11.0, 4.8), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
-        points, faces = field.mesh()
-        made = (
-            made_by(points[faces].mean(axis=1), path, np.flatnonzero(np.isfinite(values)), reach, 1.5 * float(field.cell.max()))
-            if len(faces)
-            else np.zeros(0, dtype=int)
-        )
+        points, faces, made = surface_made_by(field, path, np.flatnonzero(np.isfinite(values)), reach, _TRIANGLES)
         value = np.where(made >= 0, np.append(values, np.nan)[made], np.nan)
         paint = np.where(np.isfinite(value)[:, None], colours.to_rgba(np.nan_to_num(value))[:, :3], _STEEL)
         _shaded(left, field, (points, faces), paint)
-        for move in np.flatnonzero(path.cutting):
-            x, y = 1e3 * path.places[move : move + 2, :2].T
-            told = np.isfinite(values[move])
-            right.plot(x, y, color=colours.to_rgba(values[move]) if told else "0.8", linewidth=2.5 if told else 1.0, solid_capstyle="round")
+        right.add_collection(_stretches(path, values, np.abs(values) if limits is None else -values, colours))
+        right.autoscale_view()
         figure.colorbar(colours, ax=right, label=label, shrink=0.85)
         right.set_aspect("equal", adjustable="datalim")
         right.set_title("the path from above")
         right.set_xlabel("x, mm")
         right.set_ylabel("y, mm")
     return figure
+
+
+def _stretches(path: ToolPath, values: FloatArray, badness: FloatArray, colours: mpl.cm.ScalarMappable) -> LineCollection:
+    """The moves that cut from above, each in its colour; of many, neighbours in that of the worst of them."""
+    cutting, places = np.flatnonzero(path.cutting), 1e3 * path.places[:, :2]
+    lines, told = [], []
+    for moves in np.array_split(cutting, min(cutting.size, _DRAWN)) if cutting.size else []:
+        # rapid moves between them are gaps
+        runs = np.split(moves, np.flatnonzero(np.diff(moves) > 1) + 1)
+        lines.append(np.concatenate([np.vstack([places[run[0] : run[-1] + 2], [[np.nan, np.nan]]]) for run in runs])[:-1])
+        told.append(values[moves[np.argmax(np.where(np.isfinite(values[moves]), badness[moves], -np.inf))]])
+    known = np.isfinite(told)
+    paint = np.where(known[:, None], colours.to_rgba(np.nan_to_num(told)), (0.8, 0.8, 0.8, 1.0))
+    return LineCollection(lines, colors=paint, linewidths=np.where(known, 2.5, 1.0), capstyle="round")
 
 
 def save_coloured_part(

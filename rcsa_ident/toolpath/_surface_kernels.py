@@ -297,23 +297,64 @@ def nodes_and_rest(seg, count, origin, cell, cell_one, cell_two):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def last_move(points, places, moves, reach, below, out):
-    """Fill the last of some moves whose upright tool came as near to each point as `reach` beside its axis, and no higher than `below`.
+def _beside(x, y, one, two):
+    """Square of the distance, seen from above, between a point and the move from one place to another."""
+    dx, dy = two[0] - one[0], two[1] - one[1]
+    length = dx * dx + dy * dy
+    share = min(max(((x - one[0]) * dx + (y - one[1]) * dy) / length, 0.0), 1.0) if length > 0.0 else 0.0
+    return (x - one[0] - share * dx) ** 2 + (y - one[1] - share * dy) ** 2
 
-    points: (v, 3); places: (k, 3), move m from m to m + 1; moves: ascending; out: (v,) kept where there is none.
+
+@numba.njit(cache=True, error_model="numpy")
+def moves_by_square(places, moves, reach, low, side, shape, start, held):
+    """Sort moves into the squares, seen from above, that hold a point within `reach` of them.
+
+    Parameters
+    ----------
+    places : array (k, 3)
+        Move m goes from m to m + 1.
+    moves : array of int (n,)
+        Ascending; those of a square stay so.
+    low : array (2,)
+        Corner of the first square.
+    shape : array of int (2,)
+    start : array of int (squares + 1,)
+        Where the moves of each square begin; of a first call, with an empty `held`, their numbers come out at 1 + square.
+    held : array of int (h,)
+    """
+    # a little more than half of a square's diagonal, and than the tool reaches, so that no rounding leaves a move out
+    wide, half = reach + 1e-4 * side, 0.70711 * side
+    room = start.copy()
+    for m in moves:
+        one, two = places[m], places[m + 1]
+        first_x = max(0, math.floor((min(one[0], two[0]) - wide - low[0]) / side))
+        first_y = max(0, math.floor((min(one[1], two[1]) - wide - low[1]) / side))
+        last_x = min(shape[0] - 1, math.floor((max(one[0], two[0]) + wide - low[0]) / side))
+        last_y = min(shape[1] - 1, math.floor((max(one[1], two[1]) + wide - low[1]) / side))
+        for i in range(first_x, last_x + 1):
+            for j in range(first_y, last_y + 1):
+                if _beside(low[0] + (i + 0.5) * side, low[1] + (j + 0.5) * side, one, two) <= (wide + half) ** 2:
+                    square = i * shape[1] + j
+                    if held.size:
+                        held[room[square]] = m
+                        room[square] += 1
+                    else:
+                        start[square + 1] += 1
+
+
+@numba.njit(cache=True, error_model="numpy")
+def last_move(points, places, reach, below, low, side, shape, start, held, out):
+    """Fill the last move whose upright tool came as near to each point as `reach` beside its axis, and no higher than `below`.
+
+    points: (v, 3); the moves are `held` by the squares that the points lie in, as `moves_by_square` sorts them; out: (v,) kept where
+    there is none.
     """
     for p in range(points.shape[0]):
         x, y, z = points[p]
-        for n in range(moves.size - 1, -1, -1):
-            m = moves[n]
-            ax, ay, az = places[m]
-            bx, by, bz = places[m + 1]
-            if z < min(az, bz) - below:
-                continue
-            dx, dy = bx - ax, by - ay
-            length = dx * dx + dy * dy
-            share = min(max(((x - ax) * dx + (y - ay) * dy) / length, 0.0), 1.0) if length > 0.0 else 0.0
-            off = (x - ax - share * dx) ** 2 + (y - ay - share * dy) ** 2
-            if off <= reach * reach:
-                out[p] = m
+        i, j = min(int((x - low[0]) / side), shape[0] - 1), min(int((y - low[1]) / side), shape[1] - 1)
+        square = i * shape[1] + j
+        for n in range(start[square + 1] - 1, start[square] - 1, -1):
+            one, two = places[held[n]], places[held[n] + 1]
+            if z >= min(one[2], two[2]) - below and _beside(x, y, one, two) <= reach * reach:
+                out[p] = held[n]
                 break

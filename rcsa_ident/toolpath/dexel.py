@@ -31,8 +31,14 @@ def memory_of(size: FloatArray, cell: float) -> int:
     >>> round(memory_of(np.array([0.2, 0.2, 0.05]), 0.25e-3) / 1e6)
     33
     """
-    n = np.maximum(np.ceil(np.asarray(size) / cell - 1e-9), 1.0)
+    n = _nodes(np.asarray(size), cell)
     return int(_LINE * (n[0] * n[1] + n[1] * n[2] + n[0] * n[2]))
+
+
+def _nodes(size: FloatArray, cell: float) -> FloatArray:
+    """Nodes along each side; of absurdly small cells 1e100, so that what is computed of them are numbers that can be compared."""
+    with np.errstate(over="ignore"):
+        return np.clip(np.ceil(size / cell - 1e-9), 1.0, 1e100)
 
 
 @dataclass(slots=True, eq=False, repr=False)
@@ -129,7 +135,7 @@ class DexelField(Shown):
         if low.shape != (3,) or high.shape != (3,) or not np.all(np.isfinite([low, high])) or not np.all(high > low):
             found = f"{(1e3 * low).tolist()} to {(1e3 * high).tolist()} mm"
             raise InputError("stock", found, "a block whose corners are finite, the second one above the first in x, y and z")
-        shape = np.maximum(np.ceil((high - low) / positive("cell", cell, "m") - 1e-9), 1.0)
+        shape = _nodes(high - low, positive("cell", cell, "m"))
         if np.prod(shape) > MOST_NODES:
             raise InputError("cell", f"{1e3 * cell:g} mm", f"larger cells: the stock would have {np.prod(shape):.2g} of them")
         nx, ny, nz = (int(n) for n in shape)

@@ -14,7 +14,7 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Shown
 from rcsa_ident.toolpath._dexel_kernels import cut_leaning, sweep_upright
 from rcsa_ident.toolpath._engagement_kernels import distance_at
-from rcsa_ident.toolpath._surface_kernels import last_move
+from rcsa_ident.toolpath._surface_kernels import last_move, moves_by_square
 from rcsa_ident.toolpath.dexel import GRIDS, DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.solid import ToolSolid
@@ -23,6 +23,8 @@ from rcsa_ident.toolpath.solid import ToolSolid
 _UPRIGHT = 1e-9
 #: By which ridges between substeps may stand, by default, as a share of the distance between lines.
 TOLERANCE = 0.01
+#: Squares along the longer side of a surface whose moves are looked up, at most.
+_SQUARES = 128
 _AXES = tuple(np.array(axes) for axes in GRIDS)
 
 
@@ -168,8 +170,47 @@ def made_by(points: FloatArray, path: ToolPath, moves: np.ndarray, radius: float
         How far a point may lie beside the tool's wall or below its tip.
     """
     found = np.full(len(points), -1, dtype=np.int64)
-    last_move(np.ascontiguousarray(points), np.ascontiguousarray(path.places), np.asarray(moves), radius + near, near, found)
+    if not len(points) or not len(moves):
+        return found
+    points, places, reach = np.ascontiguousarray(points), np.ascontiguousarray(path.places), radius + near
+    low = points[:, :2].min(axis=0)
+    size = points[:, :2].max(axis=0) - low
+    side = max(reach, float(size.max()) / _SQUARES)
+    shape = (size / side).astype(np.int64) + 1
+    sorting = places, np.asarray(moves), reach, low, side, shape
+    start = np.zeros(int(np.prod(shape)) + 1, dtype=np.int64)
+    moves_by_square(*sorting, start, np.empty(0, dtype=np.int64))
+    start = np.cumsum(start)
+    held = np.empty(start[-1], dtype=np.int64)
+    if held.size:
+        moves_by_square(*sorting, start, held)
+        last_move(points, places, reach, near, low, side, shape, start, held, found)
     return found
+
+
+def surface_made_by(
+    field: DexelField, path: ToolPath, moves: np.ndarray, radius: float, most: int
+) -> tuple[FloatArray, np.ndarray, np.ndarray]:
+    """Return the surface that is left, as `DexelField.mesh`, and of each triangle the last of some moves that made it, shape (f,).
+
+    Parameters
+    ----------
+    field : DexelField
+    path : ToolPath
+        Of an upright tool.
+    moves : array of int
+        Ascending.
+    radius : float [m]
+        Of the tool.
+    most : int
+        Triangles.
+    """
+    points, faces = field.mesh(most)
+    corners = points[faces]
+    # a surface drawn through few lines stands off the one that was cut
+    size = float(np.median(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1))) if len(faces) else 0.0
+    near = 1.5 * max(size, float(field.cell.max()))
+    return points, faces, made_by(corners.mean(axis=1), path, moves, radius, near)
 
 
 def frame_of(axis: FloatArray) -> FloatArray:

@@ -169,7 +169,9 @@ def lobe_job(store: Store, machine: str, result: str, speeds: int, method: str) 
 
 @contextmanager
 def working(folder: Path, url: str, name: str) -> Iterator[subprocess.Popen]:
-    words, environment = command(folder, "worker", "--count", "0", "--lobes", "1", RCSA_IDENT_DATABASE=url, RCSA_IDENT_JOB_NICE="0")
+    words, environment = command(
+        folder, "worker", "--count", "0", "--lobes", "1", "--paths", "0", RCSA_IDENT_DATABASE=url, RCSA_IDENT_JOB_NICE="0"
+    )
     with (folder.parent / name).open("w") as log, subprocess.Popen(words, env=environment, stderr=log) as running:
         try:
             yield running

@@ -15,6 +15,7 @@ from api.jobs.worker import carry
 from api.schemas.paths import PathMillingQuery, PathStabilityQuery, RemovalQuery
 from api.work import path_answers
 from api.work import paths as work
+from rcsa_ident.errors import InputError
 from rcsa_ident.io.meshes import write_mesh
 from rcsa_ident.io.robots import robot_keys
 from tests.api.identifying import Steps, carried, carriers
@@ -173,6 +174,21 @@ def test_milling_is_told_turn_by_turn(shop, store, tmp_path, program):
     assert answer.columns["length_mm"][0] == 0.0
 
 
+def test_the_weight_of_an_arm_may_be_left_out(monkeypatch, shop, store, tmp_path, program):
+    client, id = shop
+    told = []
+
+    def milled(change, path, field, steps, play, weight, *further, **named):
+        told.append((play, weight))
+        raise InputError("path", "one", "another")
+
+    monkeypatch.setattr(work, "mill_path", milled)
+    for further in ({}, {"weight": False}, {"play": False}):
+        client.cut_path("milling", program, "T1", id, **COARSE, **MATERIAL, **further)
+    carried(store, tmp_path)
+    assert told == [(True, True), (True, False), (False, True)]
+
+
 def test_a_stock_may_be_a_surface(client, store, tmp_path, program):
     client.write_tooling("T1", by_hand.TOOLING)
     corners = 1e-3 * np.array([[x, y, z] for x in (0.0, 30.0) for y in (0.0, 24.0) for z in (-8.0, 0.0)])
@@ -202,6 +218,7 @@ def test_a_stock_may_be_a_surface(client, store, tmp_path, program):
         ("removal", {"block_mm": None}, "block_mm"),
         ("removal", {"cell_mm": 0.0}, "cell_mm"),
         ("removal", {"cell_mm": 0.001}, "cell_mm"),
+        ("removal", {"cell_mm": 1e-200}, "cell_mm"),
         ("removal", {"cell_mm": 0.008, "step_mm": 0.01}, "cell_mm"),
         ("removal", {"step_mm": 0.0005}, "step_mm"),
         ("removal", {"further": 1}, "further"),
@@ -288,6 +305,8 @@ def test_there_is_an_end_to_long_work(client, store, tmp_path, program):
     (fault,) = found.job.problem.errors
     assert fault.field == "path"
     assert "(removal)" in fault.found
+    assert "larger cells" in fault.allowed
+    assert "bands" not in fault.allowed
 
 
 def test_it_is_cancelled_while_it_waits_and_while_it_cuts(monkeypatch, client, store, tmp_path, program):

@@ -66,6 +66,7 @@ def test_stock_may_be_a_file_and_words_are_plain(slot, tmp_path):
         ("stock.step", (), "suffix '.step'"),
         ("none.stl", (), "none.stl"),
         (BLOCK, ("--cell-mm", 0), "--cell-mm"),
+        (BLOCK, ("--cell-mm", 1e-200), "--cell-mm: found 1e-200 mm"),
         (BLOCK, ("--step-mm", -1), "--step-mm"),
         (BLOCK, ("--part", "part.step"), "suffix '.step'"),
         (BLOCK, ("--plot", "part.gif"), "--plot"),

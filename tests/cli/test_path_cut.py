@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
+from rcsa_ident.io.setups import read_tooling
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.robots import ROBOTS
 
@@ -126,6 +127,24 @@ def test_bad_input_is_named(files, tmp_path, change, said):
         assert found.exit_code == 2
         assert said in found.output
         assert not (tmp_path / "OUT.csv").exists()
+
+
+@pytest.mark.parametrize("option", ["--plot", "--plot-error"])
+def test_a_picture_of_another_kind_is_refused_before_the_work(files, tmp_path, option):
+    found = run("stability", *files, *STOCK, *CUT, "--out", tmp_path / "OUT.csv", option, tmp_path / "PART.xyz")
+    assert found.exit_code == 2
+    assert f"{option}: found suffix '.xyz'" in " ".join(found.output.split())
+    assert not (tmp_path / "OUT.csv").exists()
+
+
+def test_what_is_odd_about_a_tooling_is_said(files, tmp_path):
+    """A holder with a very thin wall."""
+    odd = tmp_path / "ODD.toml"
+    odd.write_text(TOOL.read_text().replace("inner_diameter_mm = 20.0", "inner_diameter_mm = 58.0"))
+    (remark,) = read_tooling(odd).remarks
+    asked = ("mill", odd, *files[1:], *STOCK, *CUT, "--out", tmp_path / "F.csv", "--steps", 60)
+    assert f"warning: {remark}" in " ".join(run(*asked).output.split())
+    assert remark in json.loads(run(*asked, "--json").stdout)["warnings"]
 
 
 def test_what_is_lacking_is_named(files, tmp_path):

@@ -205,6 +205,10 @@ def test_what_is_no_stock_is_refused():
         DexelField.from_mesh(points, faces[:, ::-1], 1e-3)
     with pytest.raises(InputError, match="finite"):
         DexelField.from_mesh(np.where(points == 0.01, np.nan, points), faces, 1e-3)
+    for tiny in (1e-200, 1e-320):
+        with pytest.raises(InputError, match=r"cell: .*larger cells"):
+            DexelField.block([0.0, 0.0, 0.0], [0.1, 0.1, 0.1], tiny)
+        assert memory_of(np.array([0.1, 0.1, 0.1]), tiny) > 1e100
     with pytest.raises(InputError, match="larger cells"):
         DexelField.block([0.0, 0.0, 0.0], [1.0, 1.0, 1.0], 1e-5)
     with pytest.raises(InputError, match="above the first"):

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.toolpath.dexel import DexelField, check_closed
+from rcsa_ident.toolpath.path import ToolPath
+from rcsa_ident.toolpath.removal import made_by
 
 
 def box(low, high):
@@ -66,3 +68,38 @@ def test_a_block_comes_back_with_its_edges():
     back = DexelField.from_mesh(points, faces, 0.5e-3)
     assert 0.998 * field.volume < back.volume < field.volume
     assert np.allclose([back.low, back.high], [field.low, field.high], rtol=0.0, atol=1e-9)
+
+
+def last_of(points, places, moves, reach, below):
+    """The slow twin of sorted moves: every point asks every move, in the complex plane."""
+    found = np.full(len(points), -1)
+    for p, (x, y, z) in enumerate(points):
+        for m in moves:
+            one, two = complex(*places[m, :2]), complex(*places[m + 1, :2])
+            way, there = two - one, complex(x, y)
+            share = np.clip(((there - one) * way.conjugate()).real / abs(way) ** 2, 0.0, 1.0) if way else 0.0
+            if z >= min(places[m, 2], places[m + 1, 2]) - below and abs(there - one - share * way) <= reach:
+                found[p] = m
+    return found
+
+
+@pytest.mark.parametrize("reach", [0.3e-3, 3e-3, 30e-3])
+def test_the_last_move_is_found_among_its_neighbours(reach):
+    """Short and long moves, plunges and ones beyond the surface, with squares as large as the tool, as a share of the part, and one."""
+    rng = np.random.default_rng(3)
+    places = np.cumsum(rng.normal(0.0, 2e-3, (60, 3)), axis=0)
+    places[20] = [0.05, -0.02, 0.0]
+    places[41, :2] = places[40, :2]
+    points = rng.uniform(-0.03, 0.03, (300, 3))
+    moves = np.delete(np.arange(59), [5, 58])
+    found = made_by(points, ToolPath(places), moves, 0.9 * reach, 0.1 * reach)
+    assert np.array_equal(found, last_of(points, places, moves, reach, 0.1 * reach))
+    assert np.any(found < 0)
+    assert np.any(found >= 0)
+
+
+def test_no_move_makes_nothing():
+    path = ToolPath(np.zeros((2, 3)))
+    assert made_by(np.zeros((0, 3)), path, np.arange(1), 0.01, 0.001).size == 0
+    assert made_by(np.ones((3, 3)), path, np.arange(1), 0.01, 0.001).tolist() == [-1, -1, -1]
+    assert made_by(np.zeros((3, 3)), path, np.arange(0), 0.01, 0.001).tolist() == [-1, -1, -1]
