@@ -29,8 +29,8 @@ _BEND = np.radians(30.0)
 _THIN = 1e-6
 #: Share of the radius by which a wall may stand off the path's own.
 _OTHER_WALL = 0.1
-#: A move shorter than this is none, one that climbs more than this is not level [m].
-_NOWHERE, _LEVEL = 1e-7, 2e-5
+#: A move shorter than this is none, and level is one that climbs no more than this, and by no more than this share of its length.
+_NOWHERE, _LEVEL, _SLOPE = 1e-7, 2e-5, 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,7 +169,9 @@ def mill_along(
 
 def _marched(path: ToolPath, sweep: Sweep, move: int) -> bool:
     length = float(path.lengths[move])
-    return bool(path.cutting[move] and sweep.upright[move] and length > _NOWHERE and abs(path.moves[move, 2]) <= _LEVEL)
+    return bool(
+        path.cutting[move] and sweep.upright[move] and length > _NOWHERE and abs(path.moves[move, 2]) <= min(_LEVEL, _SLOPE * length)
+    )
 
 
 class _Marcher:
