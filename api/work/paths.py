@@ -152,7 +152,10 @@ def weighed(machine: MachineText | None, tooling: ToolingSource, request: PathRe
     if not np.any(path.lengths > 0.0):
         raise InputError("path", "no move", "one or more")
     block, surface = _stock(request)
-    low, high = block if block is not None else (surface[0].min(axis=0), surface[0].max(axis=0))  # type: ignore[index]
+    if block is None:
+        assert surface is not None
+        block = surface[0].min(axis=0), surface[0].max(axis=0)
+    low, high = block
     solid = solid_of(tool)
     cell = default_cell(solid.radius, high - low) if request.cell is None else request.cell
     memory = memory_of(high - low, cell)

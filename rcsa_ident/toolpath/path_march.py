@@ -274,8 +274,7 @@ class _Marcher:
 
     def _told(self, move: int) -> str:
         path = self.sweep.path
-        line = f"line {path.line[move + 1]}" if path.line[move + 1] else f"place {move + 2}"
-        return line
+        return f"line {path.line[move + 1]}" if path.line[move + 1] else f"place {move + 2}"
 
     def _cut(self, frame: PathFrame, span: float, level: float, speed: float) -> Cut | None:
         """The slices of the material that stands beside a part of the path; None where there is none as high as the edges."""

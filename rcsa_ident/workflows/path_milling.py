@@ -26,8 +26,8 @@ from rcsa_ident.workflows.robot_milling import arm_carrier
 from rcsa_ident.workflows.tool_change import ToolChange
 
 #: Share of its swing by which the tip stands elsewhere after a turn where it chatters whatever the cut does; and where the cut stays as it
-#: is, its mean force to a tenth: below the limit it comes back to a fifth of that (tests/workflows/test_path_milling.py).
-_FAR, _ELSEWHERE, _SAME = 0.15, 0.01, 0.1
+#: is, its mean force to a fiftieth: below the limit it comes back to a fifth of that (tests/workflows/test_path_milling.py).
+_FAR, _ELSEWHERE, _SAME = 0.15, 0.01, 0.02
 #: What counts as standing still [m], turns that tell, and how much more it may stand elsewhere for how much the way bends a turn [1/rad].
 _STILL, _FEWEST, _BENT = 1e-7, 9, 2.0
 #: Turns that are looked at together at most, and bend that ends a run [rad].
