@@ -20,6 +20,15 @@ class InputError(RcsaIdentError, ValueError):
         What may stand there, in words, with its unit.
     where : str, optional
         The file (and line) where it stood.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> try:
+    ...     ri.rpm(-1)
+    ... except ri.InputError as error:
+    ...     print(error)
+    value: found -1, allowed is a finite number greater than 0 [rev/min]
     """
 
     def __init__(self, field: str, found: object, allowed: str, where: str = "") -> None:

@@ -56,6 +56,15 @@ class Tooling(Saved):
     ------
     InputError
         If something about them is impossible, each taken for itself or all together.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> tool = ri.sample_tooling("S3-PG25-long")
+    >>> print(tool)
+    S3-PG25-long: 4 teeth, Ø12 mm, helix 30°, stickout 65.9 mm, insertion 44 mm, holder 100 mm
+    >>> tool.cutter.teeth, round(1e3 * tool.assembly.stickout, 1)
+    (4, 65.9)
     """
 
     name: str

@@ -52,6 +52,13 @@ def sample_campaign(folder: str | Path = "sample_runs", processes: int | None = 
         What is true of the machine goes beside it, into ``<folder>.truth``.
     processes, progress
         As of `identify`.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> campaign = ri.sample_campaign("sample_runs")
+    >>> sorted(campaign.toolings)
+    ['S1-ER32', 'S2-PG25']
     """
     from rcsa_ident.io.setups import read_campaign
     from rcsa_ident.processes import workers
@@ -90,6 +97,15 @@ def identify(
     ------
     InputError
         If no cut is usable.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.identify("sample_runs", seed=1)
+    >>> print(found)
+    converged, 20 cuts, X 7 modes, Y 8 modes
+    >>> print(found.save("RESULT.json"))
+    RESULT.json
     """
     from functools import partial
 
@@ -131,7 +147,21 @@ def _method(method: Method | str, start: Result | IdentifiedMachine | None) -> M
 
 
 def read_result(path: str | Path) -> Result:
-    """Return the identification of RESULT.json: status, reasons, modes, and the machine."""
+    """Return the identification of RESULT.json: status, reasons, modes, and the machine.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.read_result("RESULT.json")
+    >>> print(found.status)
+    converged
+    >>> print(found.machine)
+    HPM sample machine: X 7 modes, Y 8 modes, 533 to 4266 Hz, converged
+    """
     from rcsa_ident.identified import Result
     from rcsa_ident.io import results
 
@@ -139,14 +169,42 @@ def read_result(path: str | Path) -> Result:
 
 
 def read_machine(path: str | Path) -> Machine:
-    """Return the machine of RESULT.json, or of FLANGE.csv: a flange that was measured or decoupled."""
+    """Return the machine of RESULT.json, or of FLANGE.csv: a flange that was measured or decoupled.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> machine = ri.read_machine("RESULT.json")
+    >>> print(machine)
+    HPM sample machine: X 7 modes, Y 8 modes, 533 to 4266 Hz, converged
+    >>> print(machine.tip(ri.sample_tooling("S3-PG25-long")))
+    tip.x, tip.y: 4167 frequencies, 100 to 4266 Hz, with its spread
+    """
     from rcsa_ident.io.flanges import read_flange_machine
 
     return read_flange_machine(path) if Path(path).suffix.lower() == ".csv" else read_result(path).machine
 
 
 def read_modes(path: str | Path) -> TipModes:
-    """Return the modes of a tip from MODES.toml; a direction without modes is rigid."""
+    r"""Return the modes of a tip from MODES.toml; a direction without modes is rigid.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> from pathlib import Path
+    >>> text = "[[y]]\nnatural_frequency_hz = 900.0\ndamping_ratio = 0.02\nmodal_mass_kg = 0.04"
+    >>> _ = Path("MODES.toml").write_text(text)
+    >>> print(ri.read_modes("MODES.toml"))
+    tip: 1 mode at 900 Hz
+    """
     from rcsa_ident.io import modes
     from rcsa_ident.stability.tip_modes import TipModes
 
@@ -170,6 +228,12 @@ def read_tap_tests(
         Response in the first direction, force in the second one.
     units : str, optional
         As ``um/N`` or ``(m/s^2)/N``, whatever the files say; by default as they say.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> print(ri.read_tap_tests(y=ri.tap("hits.csv", axis="Y").save("TIP.csv")))
+    tip.x, tip.y: 12569 frequencies, 2 to 25600 Hz
     """
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io import frf_files
@@ -209,9 +273,16 @@ def advise(
     drive : SpindleDrive, optional
         Power, torque and highest speed of the spindle.
     depth : float [m], optional
-        At which speeds may one cut so deep?
+        Speeds at which one may cut so deep are told.
     planned : sequence of (speed [rad/s], depth [m])
-        How far are these cuts from chatter?
+        How far these cuts are from chatter is told.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+    >>> print(ri.advise(machine, tool, ri.CutSpec(feed_per_tooth=0.1e-3), ri.rpm(8000, 16_000, 100)))
+    S3-PG25-long: 14456 rev/min: stability limit 1.93 mm, recommended 1.55 mm, 54 cm³/min, 0.81 kW
     """
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.identified import Result
@@ -251,6 +322,13 @@ def estimate_forces(
     method : ObserverMethod, default Resonators()
     smooth : bool
         Every sample given the whole record, without lag; else as it would be live.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
+    >>> print(ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15]))
+    X 6.62 N rms (± 2.9 N), Y 12.7 N rms (± 3.9 N) over 0.22 s, 14182 rev/min, 373 to 4266 Hz
     """
     from rcsa_ident.identified import Result
     from rcsa_ident.workflows.estimate_forces import METHOD, observe
@@ -309,6 +387,14 @@ def listen(
     ------
     InputError
         The file cannot be read, does not tell what is needed, or says nothing at all.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> path = "data/sample_runs/recordings/S1-ER32-00_cut.h5"
+    >>> heard = ri.listen(path, channels=["flange_x", "flange_y"], quantity="displacement")
+    >>> print(heard)
+    stable at 7999.6 rev/min
     """
     from rcsa_ident.io.open_recording import open_recording
     from rcsa_ident.signals.recording import Quantity
@@ -357,6 +443,14 @@ def tap(
     ------
     InputError
         A file cannot be read, or no hit can be used; the message says why of each.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.tap("hits.csv", axis="Y")
+    >>> print(found)
+    receptance Y from 2 of 2 hits, 2 to 25600 Hz
+    >>> tip = ri.read_tap_tests(y=found.save("TIP.csv"))
     """
     from rcsa_ident.io.open_recording import open_recording
     from rcsa_ident.signals.tap import HitEstimator
@@ -390,6 +484,13 @@ def ring(
         Of the tool alone.
     rate : float, optional [Hz]
         Of files that tell none.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> rung = ri.ring("DRAWN.toml", "whole.wav")
+    >>> print(rung)
+    T: bending 1, bending 2 of 2 lines; good
     """
     from rcsa_ident.io.open_recording import open_recording
     from rcsa_ident.io.setups import read_tooling
@@ -409,6 +510,15 @@ def plot_lobes(lobes: StabilityLobes, **options: Any) -> Figure:
     lobes : StabilityLobes
     **options
         Of `rcsa_ident.report.lobes.stability_figure`: recommended cuts, tested cuts, a map below them, a surface.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+    >>> ri.plot_lobes(lobes).savefig("lobes.svg")
     """
     from rcsa_ident.report.lobes import stability_figure
 
@@ -428,6 +538,15 @@ def connect(url: str = "http://127.0.0.1:8000", key: str | None = None) -> Any:
     ------
     InputError
         If the package beside this one that is called `api` is another one, or the client's own requirement is not installed.
+
+    Examples
+    --------
+    Nothing is sent before something is asked:
+
+    >>> import rcsa_ident as ri
+    >>> with ri.connect("http://127.0.0.1:8000") as client:
+    ...     print(type(client).__name__)
+    Client
     """
     # by name and late: the library knows nothing of the service (an import contract), only this door opens to it
     try:

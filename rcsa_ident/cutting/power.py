@@ -84,6 +84,15 @@ class SpindleDrive(Shown):
         Infinite where nothing is known.
     torque : array, shape (k,) [N m]
     max_speed : float [rad/s]
+
+    Examples
+    --------
+    32 N m up to 6000 rev/min, 20 kW from there on:
+
+    >>> import rcsa_ident as ri
+    >>> drive = ri.SpindleDrive(ri.rpm(1000, 6000, 5000), [3.35e3, 20.1e3], [32.0, 32.0], max_speed=ri.rpm(18_000))
+    >>> print(drive)
+    up to 20.1 kW, up to 32 N m, up to 18000 rev/min
     """
 
     speed: FloatArray

@@ -21,7 +21,16 @@ LONGEST = 1 << 20
 
 
 class Quantity(StrEnum):
-    """The physical quantity that a channel measures."""
+    """The physical quantity that a channel measures.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> ri.Quantity("displacement")
+    <Quantity.DISPLACEMENT: 'displacement'>
+    >>> [str(each) for each in ri.Quantity]
+    ['displacement', 'acceleration', 'trigger', 'force', 'sound']
+    """
 
     DISPLACEMENT = "displacement"
     ACCELERATION = "acceleration"
@@ -71,13 +80,13 @@ class Sensor:
         spindle's housing (see `Recording.accelerometer`).
     mount_resonance : float or None [Hz]
         Of the sensor on its mount, a magnet or wax: below it motion is shown too large, by 1 / (1 - (f / resonance)^2).
+    rotation : float [rad]
+        Of the direction that it measures from its axis, about the spindle's, from +X towards +Y.
     gain_spread, cross_talk_spread : float [-]
         Standard deviations of the gain's logarithm, and of the share that a displacement sensor feels of the other axis' motion. They
         count where something of the campaign's drawings is not exact, too.
     delay_spread : float [s]
         Standard deviation of the delay; likewise.
-    rotation : float [rad]
-        Of the direction that it measures from its axis, about the spindle's, from +X towards +Y.
 
     Examples
     --------

@@ -48,6 +48,18 @@ class TipModes(PoleResidue):
     shape : array, shape (k, m) [-], default none
         How each mode moves there, over its motion at the tip; straight lines in between, constant beyond the first and the last.
         Such modes have real directions, and no constant stands beside them.
+
+    Examples
+    --------
+    A mode along Y; X is rigid:
+
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> print(tip)
+    tip: 1 mode at 900 Hz
+    >>> bool(tip.receptance().between("tip.x", "tip.x").any())
+    False
     """
 
     heights: FloatArray | None = None
