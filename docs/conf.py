@@ -71,7 +71,7 @@ sphinx_gallery_conf = {
     "examples_dirs": ["examples"],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
-    "ignore_pattern": r"/_",
+    "ignore_pattern": r"^_",
     "download_all_examples": False,
     "plot_gallery": not tags.has("quick"),  # noqa: F821  # Sphinx puts it here
     "show_memory": False,

@@ -44,7 +44,14 @@ class InputError(RcsaIdentError, ValueError):
         return type(self), (self.field, self.found, self.allowed, self.where)
 
     def at(self, where: str) -> InputError:
-        """Return the same error with the file named in which it stood."""
+        """Return the same error with the file named in which it stood.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> print(ri.InputError("teeth", 0, "1 or more").at("TOOL.toml"))
+        TOOL.toml: teeth: found 0, allowed is 1 or more
+        """
         return type(self)(self.field, self.found, self.allowed, where)
 
 

@@ -183,6 +183,14 @@ class MillingProcess(Shown):
         ------
         InputError
             If the engagement changes along the edge.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+        >>> conditions = cut.conditions(ri.rpm(12_000), 1e-3)
+        >>> round(conditions.spindle_speed, 1), conditions.axial_depth
+        (1256.6, 0.001)
         """
         if self.engagement_profile is not None:
             raise InputError("engagement_profile", "an engagement that changes along the edge", "one engagement for the whole edge")

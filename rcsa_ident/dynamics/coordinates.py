@@ -62,7 +62,14 @@ class Coordinate:
 
     @classmethod
     def parse(cls, text: str) -> Coordinate:
-        """Read ``point.dof``."""
+        """Read ``point.dof``.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> ri.Coordinate.parse("tip.x")
+        Coordinate(point='tip', dof=<Dof.X: 'x'>)
+        """
         point, _, dof = text.rpartition(".")
         try:
             return cls(point, Dof(dof))

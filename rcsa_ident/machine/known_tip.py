@@ -92,7 +92,16 @@ class KnownTip(TipSource):
         stiffness_spread: float = STIFFNESS_SPREAD,
         directions: Sequence[Coordinate] = TIP,
     ) -> UncertainReceptance | TipModes:
-        """Return the tip as it is known, whatever tooling is named."""
+        """Return the tip as it is known, whatever tooling is named.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> machine = ri.KnownTip(ri.TipModes.of({ri.Dof.Y: mode}))
+        >>> print(machine.tip(ri.sample_tooling("S1-ER32"), ri.hz(500.0, 2000.0, 1.0)))
+        tip: 1 mode at 900 Hz
+        """
         del tooling, omega, spread, stiffness_spread, directions
         if isinstance(self.known, TipModes):
             return self.known

@@ -192,7 +192,17 @@ class Recording(Drawn):
         return next(iter(accelerometers(self.sensors, axis, role)), None)
 
     def channel(self, quantity: Quantity, axis: Dof | None = None, part: slice = slice(None)) -> tuple[Sensor, FloatArray] | None:
-        """Return the first channel of this quantity and axis with its samples, or those of a part, or None."""
+        """Return the first channel of this quantity and axis with its samples, or those of a part, or None.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> sensors = ri.read_campaign("data/sample_runs").sensors
+        >>> cut = ri.read_recording("data/sample_runs/recordings/S1-ER32-00_cut.h5", sensors)
+        >>> sensor, gap = cut.channel(ri.Quantity.DISPLACEMENT, ri.Dof.X)
+        >>> sensor.name, gap.shape
+        ('flange_x', (7168,))
+        """
         found = self.sensor(quantity, axis)
         return None if found is None else (found, self.samples[part][:, self.sensors.index(found)])
 
