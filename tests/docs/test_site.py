@@ -65,7 +65,7 @@ def site(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def pages(site) -> dict[Path, Page]:
-    return {path: Page(path) for path in site.rglob("*.html")}
+    return {path: Page(path) for path in site.rglob("*.html") if "_static" not in path.parts}
 
 
 def missing(target: str, page: Path, pages: dict[Path, Page]) -> bool:
