@@ -27,7 +27,7 @@ from api.schemas.robots import EXAMPLE
 from api.schemas.toolings import MOST_SEGMENTS
 from api.work.robots import MOST_JOINTS, MOST_PLACES
 from api.work.tasks import MOST_LINES
-from benchmarks.hostile import Cost, cost_of
+from benchmarks.request_cost import Cost, cost_of
 from benchmarks.service import ask, machine_text, new_tooling, serving
 from benchmarks.uploads import SAMPLES, campaign_of, recording
 from rcsa_ident.io.setups import tooling_of
