@@ -60,8 +60,7 @@ _PLAIN: dict[str, Any] = {
 }
 _TOOLINGS = (
     _PLAIN,
-    _PLAIN
-    | {"cutter": _CUTTER | {"teeth": 2, "pitch_deg": [180.0] * 2, "serration": _WAVE | {"shift": [0.0] * 2}} | _OFFSETS},
+    _PLAIN | {"cutter": _CUTTER | {"teeth": 2, "pitch_deg": [180.0] * 2, "serration": _WAVE | {"shift": [0.0] * 2}} | _OFFSETS},
     _PLAIN | {"cutter": {"teeth": 2, "diameter_mm": 12.0, "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5}}},
     {
         "name": "all",
@@ -248,15 +247,15 @@ def _read_campaign(data: Mapping[str, Any]) -> object:
         table.text(key, allowed="the path of a tooling file")
         return some.get(key, some["S1"])
 
-    return campaign_of(data, "", "campaign", tooling, lambda table, key: Path(table.text(key, allowed="the path of a recording")))
+    return campaign_of(data, "", "", tooling, lambda table, key: Path(table.text(key, allowed="the path of a recording")))
 
 
 #: Files by name: what they are, their reader, and files that between them hold everything that it knows, each of what may be left out
 #: missing from one of them.
 _FILES: dict[str, tuple[str, Callable[[Mapping[str, Any]], object], Iterable[Mapping[str, Any]]]] = {
-    "tooling": ("A holder, a tool clamped in it, and the cutter", lambda data: tooling_of(data, "", "tooling"), _TOOLINGS),
+    "tooling": ("A holder, a tool clamped in it, and the cutter", lambda data: tooling_of(data, "", ""), _TOOLINGS),
     "campaign": ("campaign.toml: sensors, workpiece, toolings, cuts and hammer tests", _read_campaign, _CAMPAIGNS),
-    "machine": ("MACHINE.toml: a virtual machine", lambda data: machine_of(data, "", "machine", Path()), _MACHINES),
+    "machine": ("MACHINE.toml: a virtual machine", lambda data: machine_of(data, "", "", Path()), _MACHINES),
     "modes": ("MODES.toml: modes of the tip", lambda data: modes_of(data, ""), _MODES),
     "cases": ("CASES.toml: tested cuts of several toolings, which `cases` lays over their lobes", _read_cases, _CASES),
     "robot": ("ROBOT.toml: an arm, its joints, links and springs", lambda data: robot_of(dict(data), ""), _ROBOTS),

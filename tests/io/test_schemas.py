@@ -14,7 +14,9 @@ from tests.fixtures.paths import ROOT
 
 #: What hangs on another key of the file, or asks for one more key or entry: only a reader knows it.
 _BETWEEN_KEYS = re.compile(
-    r"finite numbers? \[(deg|mm|wavelengths)\]|radial_depth_mm: found [\d.e+]+, allowed is a finite number above 0 and at most|the distance from the tip from 0 to|angles above 0 that add up|on a tool that is|above entry_angle_deg|at most half of the diameter|"
+    r"finite numbers? \[(deg|mm|wavelengths)\]|"
+    r"radial_depth_mm: found [\d.e+]+, allowed is a finite number above 0 and at most|the distance from the tip from 0 to|"
+    r"angles above 0 that add up|on a tool that is|above entry_angle_deg|at most half of the diameter|"
     r"a list of \d+ of them, one a tooth|an amplitude below the wavelength|offsets for the shape table|"
     r"(entry|exit)_angle_deg: found nothing|one way to tell the engagement|above y_from_mm|a block that the cutter reaches|"
     r"needs the map of its engagement|engagement map: found no such file|never fall \[m\]|0 <= start <= end|a cut in which some tooth cuts|"
