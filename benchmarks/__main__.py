@@ -63,6 +63,7 @@ STUDIES = (
     "robot_cuts",
     "robot_milling",
     "formats",
+    "format_examples",
 )
 
 
