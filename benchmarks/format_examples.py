@@ -1,4 +1,4 @@
-"""``python -m benchmarks format_examples``: write ``docs/formats/examples/``, a small file of every format that the program reads or writes.
+"""``python -m benchmarks format_examples``: write ``docs/formats/examples/``, a small file of every format.
 
 Samples are 40 ms of a cut of the sample runs; sound, hits and receptances are made of two modes, with a fixed seed. Tables that commands
 write are written by these commands.
@@ -19,7 +19,6 @@ import numpy as np
 
 import rcsa_ident as ri
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.exports import write_receptances_uff
