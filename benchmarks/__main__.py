@@ -62,6 +62,8 @@ STUDIES = (
     "corner_radius",
     "robot_cuts",
     "robot_milling",
+    "fuzz",
+    "mutation",
 )
 
 
