@@ -137,8 +137,17 @@ class _Turn:
                 return bytes(atheris.Mutate(data, most))
             return change(data, rng)[:most]
 
-        options = [f"-max_len={LONGEST}", f"-seed={self.seed}", f"-timeout={_HANGS}", "-rss_limit_mb=6000", "-handle_segv=0", "-len_control=0"]
-        atheris.Setup(["fuzz", str(corpus), *options, f"-artifact_prefix={self.folder}/finds/{self.name}-"], self.call, custom_mutator=changed)
+        options = [
+            f"-max_len={LONGEST}",
+            f"-seed={self.seed}",
+            f"-timeout={_HANGS}",
+            "-rss_limit_mb=6000",
+            "-handle_segv=0",
+            "-len_control=0",
+        ]
+        atheris.Setup(
+            ["fuzz", str(corpus), *options, f"-artifact_prefix={self.folder}/finds/{self.name}-"], self.call, custom_mutator=changed
+        )
         atheris.Fuzz()
 
     def _warm(self) -> None:
@@ -200,7 +209,11 @@ class _Turn:
 def place(error: BaseException) -> str:
     """Return what an exception is and the line of this project that it came from, or the last line of a library."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if "/rcsa_ident/" in frame.filename or "/api/" in frame.filename and "/site-packages/" not in frame.filename]
+    own = [
+        frame
+        for frame in frames
+        if "/rcsa_ident/" in frame.filename or ("/api/" in frame.filename and "/site-packages/" not in frame.filename)
+    ]
     last = own[-1] if own else frames[-1]
     return f"{type(error).__name__} {Path(last.filename).name}:{last.lineno}"
 

@@ -13,10 +13,69 @@ from typing import Any
 
 _WHOLE = (0, 1, -1, 2, 3, 7, 255, 256, 65_535, 2**31 - 1, 2**31, 2**32 - 1, 2**63, 10**30, -(10**30))
 _REAL = (0.0, -0.0, 0.5, 1.0, -1.5, 90.0, 180.0, 360.0, 1e-12, 1e-300, 5e-324, 1e12, 1e150, 1e300, 1.7e308)
-_TOKENS = ("", " ", "x", "X", "Y", "Z", "tip", "flange", "steel", "true", "\0", "é", "\u2028", "a" * 300, "../x", "nan", "1e400", "-1", "+X")
+_TOKENS = (
+    "",
+    " ",
+    "x",
+    "X",
+    "Y",
+    "Z",
+    "tip",
+    "flange",
+    "steel",
+    "true",
+    "\0",
+    "é",
+    "\u2028",
+    "a" * 300,
+    "../x",
+    "nan",
+    "1e400",
+    "-1",
+    "+X",
+)
 #: What stands between the words of tables and programs.
-_SIGNS = (b",", b";", b"\t", b" ", b"\n", b"\r\n", b"\r", b'"', b"'", b"#", b"%", b"(", b")", b"[", b"]", b"=", b":", b"-", b"+", b".", b"e", b"/")
-_NUMBERS = (b"0", b"-1", b"1", b"1e300", b"1e400", b"-1e400", b"nan", b"inf", b"9" * 25, b"1.5", b"1,5", b"0.000001", b"1e-320", b"1_0", b"0x10")
+_SIGNS = (
+    b",",
+    b";",
+    b"\t",
+    b" ",
+    b"\n",
+    b"\r\n",
+    b"\r",
+    b'"',
+    b"'",
+    b"#",
+    b"%",
+    b"(",
+    b")",
+    b"[",
+    b"]",
+    b"=",
+    b":",
+    b"-",
+    b"+",
+    b".",
+    b"e",
+    b"/",
+)
+_NUMBERS = (
+    b"0",
+    b"-1",
+    b"1",
+    b"1e300",
+    b"1e400",
+    b"-1e400",
+    b"nan",
+    b"inf",
+    b"9" * 25,
+    b"1.5",
+    b"1,5",
+    b"0.000001",
+    b"1e-320",
+    b"1_0",
+    b"0x10",
+)
 
 Change = Callable[[bytes, random.Random], bytes]
 
@@ -122,7 +181,9 @@ def _changed(data: Any, rng: random.Random, odd: tuple[Any, ...], null: bool) ->
             case 3 | 4 | 5 if isinstance(value, int | float) and not isinstance(value, bool):
                 holder[key] = _near(value, rng, odd)
             case _:
-                holder[key] = rng.choice((*_WHOLE, *_REAL, *odd, *_TOKENS, True, False, [], {}, [0.0], [[]], {"x": 1}, *([None] if null else [])))
+                holder[key] = rng.choice(
+                    (*_WHOLE, *_REAL, *odd, *_TOKENS, True, False, [], {}, [0.0], [[]], {"x": 1}, *([None] if null else []))
+                )
     return data
 
 

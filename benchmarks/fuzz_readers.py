@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import tempfile
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -142,7 +142,14 @@ def _hdf5(folder: Path) -> list[bytes]:
     from tests.fixtures import hostile_hdf5 as hostile
 
     found = _recorded("hdf5")(folder)
-    for make in (hostile.soft_link, hostile.virtual, hostile.unwritten, hostile.inflating_chunk, hostile.lzf_after_deflate, hostile.own_rates):
+    for make in (
+        hostile.soft_link,
+        hostile.virtual,
+        hostile.unwritten,
+        hostile.inflating_chunk,
+        hostile.lzf_after_deflate,
+        hostile.own_rates,
+    ):
         make(folder / "h.h5")
         found.append((folder / "h.h5").read_bytes())
         (folder / "h.h5").unlink()
@@ -164,7 +171,9 @@ def _uffs(folder: Path) -> list[bytes]:
     path = folder / "f.uff"
     found = _recorded("uff", "uff-binary")(folder)
     few = np.arange(100.0, 700.0, 100.0)
-    frf = UffFunction(FRF, few, few * (1 + 2j), ordinate=UffAxis(8, "m"), denominator=UffAxis(EXCITATION_FORCE, "N"), response=(1, 1), reference=(1, 1))
+    frf = UffFunction(
+        FRF, few, few * (1 + 2j), ordinate=UffAxis(8, "m"), denominator=UffAxis(EXCITATION_FORCE, "N"), response=(1, 1), reference=(1, 1)
+    )
     for binary in (False, True):
         write_uff(path, [frf], binary)
         found.append(path.read_bytes())
@@ -397,7 +406,13 @@ def _robot_results(folder: Path) -> str:
     freedoms, bodies = sheet.freedoms(False), len(sheet.joints) + (sheet.payload is not None)
     springs = (1e6,) * freedoms
     size = PosedLayout(springs, bodies, 1).size
-    table = {"springs_nm_per_rad": springs, "modes": 1, "unknowns": [0.1] * size, "matrix": (0.01 * np.eye(size)).tolist(), "believed_sd": [0.1] * size}
+    table = {
+        "springs_nm_per_rad": springs,
+        "modes": 1,
+        "unknowns": [0.1] * size,
+        "matrix": (0.01 * np.eye(size)).tolist(),
+        "believed_sd": [0.1] * size,
+    }
     rival = {"modes": 0, "unknowns": [0.1] * PosedLayout(springs, bodies, 0).size}
     top = {"kind": "robot", "schema_version": 1, "status": "converged", "robot": robot_keys(sheet), "tilts": False}
     from rcsa_ident.io import robot_results
@@ -414,9 +429,9 @@ def _library(raw: bytes, folder: Path) -> None:
 
 
 def _libraries(folder: Path) -> list[bytes]:
+    from tests.fixtures.paths import ROOT
     from tests.fixtures.tool_library import END_MILL
     from tests.fixtures.tool_library import library as whole
-    from tests.fixtures.paths import ROOT
 
     shapes = json.loads((ROOT / "tests" / "fixtures" / "library_of_shapes.json").read_text(encoding="utf-8"))
     return [json.dumps(whole(END_MILL)).encode(), json.dumps(shapes | {"data": shapes["data"][:20]}).encode()]
@@ -426,7 +441,7 @@ def _libraries(folder: Path) -> list[bytes]:
 
 
 def _frames(raw: bytes, folder: Path) -> None:
-    from api.streams.frames import samples_of, samples_of_text, unpacked
+    from api.streams.frames import samples_of, samples_of_text
     from rcsa_ident.errors import InputError
 
     for read in (samples_of, lambda raw, channels: samples_of_text(raw.decode("utf-8", "replace"), channels)):
@@ -476,7 +491,7 @@ def _headers(raw: bytes, folder: Path) -> None:
 
     from api.conventions import expected, unchanged
     from api.problems import Problem
-    from api.routes import resumable_upload, tus
+    from api.routes import tus
     from api.transfer.body_stream import announced_digest, announced_length
     from rcsa_ident.errors import InputError
 

@@ -141,7 +141,9 @@ def test_what_is_stiffer_gives_way_less_everywhere_when_it_stands_still(tool, sp
     hard = couple(a.receptance(still), b.receptance(still), LumpedJoint(along * 1e8, turning * 1e5)).values[0].real
     size = np.sqrt(np.diag(soft))
     assert np.linalg.eigvalsh((soft - hard) / np.outer(size, size)).min() > -1e-9
-    np.testing.assert_allclose(soft, np.linalg.inv(static(a, b, 1e8, 1e5))[np.ix_(*2 * (ends(a, b),))], rtol=1e-5, atol=1e-8 * np.abs(soft).max())
+    np.testing.assert_allclose(
+        soft, np.linalg.inv(static(a, b, 1e8, 1e5))[np.ix_(*2 * (ends(a, b),))], rtol=1e-5, atol=1e-8 * np.abs(soft).max()
+    )
 
 
 def static(a: Structure, b: Structure, along: float, turning: float) -> np.ndarray:

@@ -57,7 +57,9 @@ def test_a_harder_material_and_a_softer_machine_are_the_same(name, factor, immer
     base = limits(name, tip(SKEWED), mill(2, immersion, strategy), rpm)
     hard = CuttingCoefficients(factor * COEFFICIENTS.tangential, COEFFICIENTS.radial_ratio)
     np.testing.assert_allclose(limits(name, tip(SKEWED), mill(2, immersion, strategy, coefficients=hard), rpm), base / factor, rtol=2e-4)
-    np.testing.assert_allclose(limits(name, tip(scaled(SKEWED, stiff=1.0 / factor)), mill(2, immersion, strategy), rpm), base / factor, rtol=2e-4)
+    np.testing.assert_allclose(
+        limits(name, tip(scaled(SKEWED, stiff=1.0 / factor)), mill(2, immersion, strategy), rpm), base / factor, rtol=2e-4
+    )
 
 
 @pytest.mark.parametrize("name", METHODS)
