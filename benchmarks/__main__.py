@@ -64,6 +64,8 @@ STUDIES = (
     "robot_milling",
     "formats",
     "format_examples",
+    "fuzz",
+    "mutation",
 )
 
 
