@@ -55,6 +55,8 @@ STUDIES = (
     "hammer",
     "rough",
     "rough_recommendation",
+    "validation",
+    "all",
     "labelled_cuts",
     "learn",
     "ring",
