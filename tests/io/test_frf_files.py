@@ -221,7 +221,7 @@ def test_lines_below_a_frequency_are_left_out(tmp_path):
     path.write_text("".join(f"{f} {f * 1e-9} 0\n" for f in (10, 20, 30, 40)))
     frequency, values = read_tap_tests([Source(path, ("X", "X"))], from_hz=20.0)["X", "X"]
     np.testing.assert_array_equal(frequency, [20.0, 30.0, 40.0])
-    np.testing.assert_array_equal(values, [20e-9, 30e-9, 40e-9])
+    np.testing.assert_allclose(values, [20e-9, 30e-9, 40e-9], rtol=1e-15)
     with pytest.raises(InputError, match="frf_from_hz: found 35, allowed is a frequency below the last, 40 Hz"):
         read_tap_tests([Source(path, ("X", "X"))], from_hz=35.0)
 
