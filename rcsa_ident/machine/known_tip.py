@@ -26,7 +26,7 @@ _END = 0.97
 _USUAL_DAMPING, _CRITICAL = 0.03, 0.7
 #: Share of the largest accelerance at which the first mode begins; lines that have to lie below it, and how many of them are the first;
 #: share of the modes' most negative real part above which another one matters.
-_STANDS_OUT, _FEWEST, _FIRST, _MATTERS = 0.2, 10, 3, 0.1
+_STANDS_OUT, _FEWEST, _FIRST, _MATTERS = 0.02, 10, 3, 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
