@@ -64,6 +64,7 @@ STUDIES = (
     "robot_milling",
     "formats",
     "format_examples",
+    "physics_pictures",
 )
 
 
