@@ -68,6 +68,7 @@ STUDIES = (
     "format_examples",
     "fuzz",
     "mutation",
+    "physics_pictures",
 )
 
 

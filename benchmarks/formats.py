@@ -16,13 +16,14 @@ from rcsa_ident.io.schemas import SCHEMAS, schema_of
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "formats"
 PAGE = FOLDER / "keys.md"
+#: Choices that have room in a cell.
+_MOST_CHOICES = 4
 _TITLE = "# Every key of every TOML file\n"
 _INTRODUCTION = """
 This page is written by `python -m benchmarks formats` from the JSON schemas that `rcsa-ident schema NAME` prints, and these are made of
-what the readers ask: a key that is not here is refused by name, and so is a value outside of its range. `[]` stands for each table of a
-list (`[[cuts]]`), `*` for a name of your own. *Possible* values are read; outside of the *usual* ones an answer carries a warning with the
-field and the slip that would explain it. A limit that hangs on another key of the file is told in words. A key with `–` as its default
-may be left out; what counts then is told beside it where it matters.
+what the readers ask: a key that is not here is refused by name, and so is a value that is not allowed. `NAME` is a name of your own.
+Outside of the *usual* values an answer carries a warning with the field and the slip that would explain it. A limit that hangs on another
+key of the file is told in words. A key with `–` as its default may be left out; what counts then is told beside it where it matters.
 
 An editor completes the keys and marks wrong values where the first line of a file names its schema: `#:schema tooling.json`.
 """
@@ -59,26 +60,39 @@ def page() -> str:
     unused = {(table, ending) for table, endings in meanings.items() for ending in endings}
     parts, count = [], 0
     for name in SCHEMAS:
-        lines = [
-            "| key | unit | type | possible | usual | default | meaning |",
-            "|---|---|---|---|---|---|---|",
-        ]
+        parts.append(f"\n(keys-{name})=\n## `{name}`\n\n{schema_of(name)['title']}. `rcsa-ident schema {name}` prints its schema.\n")
+        tables: dict[str, list[str]] = {}
         for row in rows_of(name):
             found = meaning_of(name, row.key, meanings)
             if found is None:
                 raise LookupError(f"docs/formats/meanings.toml does not tell what {row.key} of {name} means")
             unused.discard(found)
-            lines.append(
-                f"| `{row.key}` | {row.unit} | {row.kind} | {row.possible} | {row.usual} | {row.default} | {meanings[found[0]][found[1]]} |"
-            )
-        count += len(lines) - 2
-        title = schema_of(name)["title"]
-        head = f"\n(keys-{name})=\n## `{name}`\n\n{title}. `rcsa-ident schema {name}` prints its schema.\n"
-        parts.append("\n".join((head, *lines, "")))
+            own, _, key = row.key.rpartition(".")
+            tables.setdefault(own, []).append(_line(row, key.replace("*", "NAME"), meanings[found[0]][found[1]]))
+        for path, lines in tables.items():
+            parts += [f"{_heading(path)}\n| key | type | allowed | default | meaning |\n|---|---|---|---|---|\n", *lines]
+            count += len(lines)
     if unused:
         known = ", ".join(f"[{table}] {key}" for table, key in sorted(unused))
         raise LookupError(f"docs/formats/meanings.toml explains keys that no file has: {known}")
     return f"{_TITLE}{_INTRODUCTION}\nThere are {count} keys in {len(SCHEMAS)} files.\n" + "".join(parts)
+
+
+def _heading(path: str) -> str:
+    """The table of a path as a file writes it: ``[tool]``, ``[[tool.segments]]``, ``[materials.NAME]``."""
+    if not path:
+        return "\n### At the top\n"
+    name = path.removesuffix("[]").replace("[]", "").replace("*", "NAME")
+    return f"\n### `[[{name}]]`\n" if path.endswith("[]") else f"\n### `[{name}]`\n"
+
+
+def _line(row: Row, key: str, meaning: str) -> str:
+    """A line of a table; a long list of choices stands behind the meaning."""
+    allowed, kind = row.possible, f"{row.kind} [{row.unit}]" if row.unit else row.kind
+    if allowed.count("`, `") > _MOST_CHOICES:
+        allowed, meaning = "one of a list", f"{meaning}: {allowed}"
+    allowed = "; ".join(filter(None, (allowed, f"usual {row.usual}" if row.usual else "")))
+    return f"| `{key}` | {kind} | {allowed} | {row.default} | {meaning} |\n"
 
 
 def _rows(schema: dict[str, Any], path: str, needed: bool) -> Iterator[Row]:
