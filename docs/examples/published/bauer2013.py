@@ -2,8 +2,11 @@
 Bauer and others 2013: what a KUKA KR210 gives way
 ==================================================
 
-Natural frequencies of the robot and its give under 100 N were measured, and its model was published [bauer2013], [friedmann2011]. A force of a
-slot moves the tool by four tenths of a millimetre; commanding the posture that gives way onto the right place takes it out.
+Natural frequencies of the robot and its give under 100 N were measured, and its model was published. A force of a
+slot moves the tool by four tenths of a millimetre; commanding the posture that gives way onto the right place takes
+it out.
+
+Sources: :cite:`bauer2013`, :cite:`friedmann2011`.
 """
 
 from dataclasses import replace
@@ -40,7 +43,11 @@ def off(commanded: np.ndarray) -> np.ndarray:
     return reached(tight, commanded, push)[0] - place
 
 
-ways = {"as programmed": posture, "mirrored once": mirrored_postures(tight, posture, push), "ahead of the force": ahead_of_forces(tight, posture, push)}
+ways = {
+    "as programmed": posture,
+    "mirrored once": mirrored_postures(tight, posture, push),
+    "ahead of the force": ahead_of_forces(tight, posture, push),
+}
 left_over = {name: np.linalg.norm(off(commanded)) for name, commanded in ways.items()}
 
 # %%

@@ -3,7 +3,8 @@ One real hit of a hammer
 ========================
 
 A hit on the tip of an end mill on a machining centre, force and acceleration over one second, recorded by others
-(leekunhwee/Vibration-Signal-Processing on GitHub). The recording becomes a receptance; beside it stands the one that its authors made.
+(leekunhwee/Vibration-Signal-Processing on GitHub). The recording becomes a receptance; beside it stands the one that
+its authors made.
 """
 
 import matplotlib.pyplot as plt
