@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from tests.fixtures.paths import ROOT
 
 FOLDER = ROOT / "docs" / "examples"
-EXAMPLES = {path.stem: path for path in sorted(FOLDER.glob("*/*.py")) if not path.name.startswith("_")}
+EXAMPLES = {path.stem: path for path in sorted(FOLDER.glob("*/*.py"))}
 #: Of files that are not part of the project.
 REAL = [name for name, path in EXAMPLES.items() if path.parent.name == "real_files"]
 #: About how many seconds those take that are not done at once.
@@ -43,7 +43,7 @@ def run(monkeypatch):
 
     yield run_one
     plt.close("all")
-    sys.modules.pop("_files", None)
+    sys.modules.pop("kept", None)
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow(SLOW[n])] if n in SLOW else []) for n in EXAMPLES])
@@ -74,7 +74,7 @@ def test_an_example_is_short_and_ends_in_a_check(name):
 @pytest.mark.parametrize("name", REAL)
 def test_where_files_are_missing_it_says_so_and_shows_the_figure(name, run, monkeypatch, tmp_path, capsys):
     monkeypatch.syspath_prepend(EXAMPLES[name].parent)
-    monkeypatch.setattr("_files.FOLDER", tmp_path)
+    monkeypatch.setattr("kept.FOLDER", tmp_path)
     (axes,) = run(EXAMPLES[name]).axes
     assert len(axes.images) == 1
     assert "They can be downloaded from https://github.com/" in capsys.readouterr().out

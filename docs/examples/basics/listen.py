@@ -47,7 +47,7 @@ ax.set(xlabel="order of the spindle frequency [-]", ylabel="amplitude [of full s
 ax.set_title(f"{heard}; grey: tooth passing")
 
 # %%
-# Heard to a hair: the speed to 0.2 rev/min, the chatter to half a hertz.
+# The speed is right to 0.2 rev/min, the chatter frequency to half a hertz.
 assert heard.verdict == "chatter"
 assert abs(to_rpm(heard.spindle_speed) - 5982.0) < 0.2
 assert abs(heard.chatter[0] - 1234.5) < 0.5

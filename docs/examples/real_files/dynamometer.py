@@ -12,7 +12,7 @@ from functools import partial
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.io.recordings import read_cut

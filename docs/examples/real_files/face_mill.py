@@ -9,7 +9,7 @@ with them.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.units import to_hz, to_rpm

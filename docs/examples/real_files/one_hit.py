@@ -9,7 +9,7 @@ its authors made.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.io.frf_files import read_frfs

@@ -10,7 +10,7 @@ first sound advise, and did the second follow it?
 import matplotlib.pyplot as plt
 import numpy as np
 import scipy.signal
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.units import to_rpm
