@@ -2,8 +2,9 @@
 Five lobe methods, and islands of chatter
 =========================================
 
-Two teeth, a twentieth of the diameter, a mode at 922 Hz: period doubling lies far below what the mean force lets expect. Methods that
-know the harmonics agree; the zero-order method, which only knows the mean, does not. With a helix the doubling has islands.
+Two teeth, a twentieth of the diameter, a mode at 922 Hz: period doubling lies far below what the mean force lets
+expect. Methods that know the harmonics agree; the zero-order method, which only knows the mean, does not. With a
+helix the doubling has islands.
 """
 
 import matplotlib.pyplot as plt

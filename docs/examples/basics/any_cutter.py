@@ -2,8 +2,8 @@
 A cutter that is no cylinder
 ============================
 
-A face mill with a lead angle of 45° pushes along the axis and tilts the tip; a cylinder of the same diameter does neither. Its limits are
-computed along the true edge, and the cylinder's beside them.
+A face mill with a lead angle of 45° pushes along the axis and tilts the tip; a cylinder of the same diameter does
+neither. Its limits are computed along the true edge, and the cylinder's beside them.
 """
 
 from dataclasses import replace

@@ -2,8 +2,9 @@
 Cutting coefficients from mean forces
 =====================================
 
-Five slots at different feeds on a dynamometer: the mean forces grow in a straight line with the feed. Its slope tells the cutting
-coefficients, what is left at no feed those of the edge. Each cut's depth is off by a percent, as on a machine.
+Five slots at different feeds on a dynamometer: the mean forces grow in a straight line with the feed. Its slope tells
+the cutting coefficients, what is left at no feed those of the edge. Each cut's depth is off by a percent, as on a
+machine.
 """
 
 import matplotlib.pyplot as plt

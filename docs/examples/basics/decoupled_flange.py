@@ -2,9 +2,9 @@
 A spindle's flange from three artefacts
 =======================================
 
-Rotations cannot be hit with a hammer. Three steel cylinders of different lengths are clamped one after the other, tip, flange and
-across are measured, and their known receptances are taken out again: what is left is the flange with its slopes. It then carries a
-tool that was not measured.
+Rotations cannot be hit with a hammer. Three steel cylinders of different lengths are clamped one after the other,
+tip, flange and across are measured, and their known receptances are taken out again: what is left is the flange with
+its slopes. It then carries a tool that was not measured.
 """
 
 import matplotlib.pyplot as plt
@@ -53,7 +53,11 @@ slender = artefact(0.08, 0.03)
 tip = couple(slender, MeasuredFlange(found.receptance).receptance(omega), joint)["tip", "tip"][:, 0, 0]
 true = couple(slender, machine, joint)["tip", "tip"][:, 0, 0]
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 4.0))
-for (i, j), name in (((0, 0), "force to translation [m/N]"), ((0, 1), "moment to translation [m/(N m)]"), ((1, 1), "moment to slope [rad/(N m)]")):
+for (i, j), name in (
+    ((0, 0), "force to translation [m/N]"),
+    ((0, 1), "moment to translation [m/(N m)]"),
+    ((1, 1), "moment to slope [rad/(N m)]"),
+):
     left.semilogy(to_hz(omega), np.abs(machine.values[:, i, j]), color="0.6", lw=3.0)
     left.semilogy(to_hz(omega), np.abs(found.receptance.values[:, i, j]), lw=1.2, label=name)
 left.set(xlabel="frequency [Hz]", ylabel="magnitude [units as named]", title="Flange: true (grey), found")

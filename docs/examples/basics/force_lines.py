@@ -2,8 +2,9 @@
 The milling force as lines at the spindle's orders
 ==================================================
 
-A stable cut repeats itself every turn, so its force is a sum of lines at multiples of the spindle frequency. They are known in closed form,
-for helical edges and unequal pitch, too. Their sum must be the force over the angle, sampled slice by slice.
+A stable cut repeats itself every turn, so its force is a sum of lines at multiples of the spindle frequency. They are
+known in closed form, for helical edges and unequal pitch, too. Their sum must be the force over the angle, sampled
+slice by slice.
 """
 
 import matplotlib.pyplot as plt

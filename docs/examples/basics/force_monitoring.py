@@ -2,8 +2,9 @@
 Cutting forces from the spindle's vibration
 ===========================================
 
-Once the machine is identified, the sensors at the flange are a dynamometer: a Kalman filter turns their displacement into the force at the
-tip. Here one of the sample cuts is monitored; the virtual machine that made it also knows the lines of its true force.
+Once the machine is identified, the sensors at the flange are a dynamometer: a Kalman filter turns their displacement
+into the force at the tip. Here one of the sample cuts is monitored; the virtual machine that made it also knows the
+lines of its true force.
 """
 
 from dataclasses import replace

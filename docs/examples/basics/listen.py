@@ -2,8 +2,9 @@
 Listen to one recording
 =======================
 
-A phone beside the machine records four teeth at 6000 rev/min that chatter. Without any setting but the number of teeth, the sound
-tells the true spindle speed, the verdict, the chatter frequency, and the speeds that would put whole waves between two teeth.
+A phone beside the machine records four teeth at 6000 rev/min that chatter. Without any setting but the number of
+teeth, the sound tells the true spindle speed, the verdict, the chatter frequency, and the speeds that would put whole
+waves between two teeth.
 """
 
 import tempfile
@@ -39,12 +40,14 @@ ax.semilogy(order, spectrum, lw=0.8)
 for tooth in (4, 8, 12):
     ax.axvline(tooth, color="0.75", lw=5, zorder=0)
 place = heard.chatter[0] / (heard.spindle_speed / (2.0 * np.pi))
-ax.annotate(f"chatter\n{heard.chatter[0]:.1f} Hz", (place, 0.12), (place + 1.0, 0.15), color="C1", arrowprops={"arrowstyle": "->", "color": "C1"})
+ax.annotate(
+    f"chatter\n{heard.chatter[0]:.1f} Hz", (place, 0.12), (place + 1.0, 0.15), color="C1", arrowprops={"arrowstyle": "->", "color": "C1"}
+)
 ax.set(xlabel="order of the spindle frequency [-]", ylabel="amplitude [of full scale]", xlim=(0, 18), ylim=(1e-5, 0.5))
 ax.set_title(f"{heard}; grey: tooth passing")
 
 # %%
-# Heard to a hair: the speed to 0.2 rev/min, the chatter to half a hertz.
+# The speed is right to 0.2 rev/min, the chatter frequency to half a hertz.
 assert heard.verdict == "chatter"
 assert abs(to_rpm(heard.spindle_speed) - 5982.0) < 0.2
 assert abs(heard.chatter[0] - 1234.5) < 0.5

@@ -2,8 +2,8 @@
 Stability lobes from a modal model
 ==================================
 
-One mode at 922 Hz, alike in X and Y, carries a mill with two teeth through a slot. The modal model alone gives the stability lobes:
-the depth at which chatter begins at every spindle speed, and where it is worth working.
+One mode at 922 Hz, alike in X and Y, carries a mill with two teeth through a slot. The modal model alone gives the
+stability lobes: the depth at which chatter begins at every spindle speed, and where it is worth working.
 """
 
 import matplotlib.pyplot as plt

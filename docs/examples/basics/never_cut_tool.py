@@ -2,8 +2,9 @@
 From recordings of ordinary cuts to a tool that never cut
 =========================================================
 
-Sixteen stable cuts with two toolings, recorded by displacement sensors at the spindle's flange, tell the machine. A third tooling, longer and
-never clamped, then gets its stability lobes, a spindle speed and a recommended depth without a hammer test.
+Sixteen stable cuts with two toolings, recorded by displacement sensors at the spindle's flange, tell the machine. A
+third tooling, longer and never clamped, then gets its stability lobes, a spindle speed and a recommended depth
+without a hammer test.
 """
 
 from dataclasses import replace
@@ -15,7 +16,7 @@ import rcsa_ident as ri
 from rcsa_ident.units import to_rpm
 
 # %%
-# The sample runs were made by the virtual machine; of their 80 cuts every fifth is enough here. ``ri.sample_campaign`` makes new ones anywhere.
+# The sample runs were made by the virtual machine; of their 80 cuts every fifth is enough here. ``ri.sample_campaign`` makes new ones.
 samples = "../../../data/sample_runs"
 campaign = ri.read_campaign(samples)
 found = ri.identify(replace(campaign, cuts=campaign.cuts[::5]), seed=1, processes=1)

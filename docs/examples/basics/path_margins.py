@@ -2,8 +2,9 @@
 Which moves of a program chatter
 ================================
 
-A slot and a pocket are milled out of a block, move by move. What stands around the cutter comes from the stock as the moves before have left
-it; every move then has its margin to chatter, and below one it chatters. The part is coloured by the margin of the moves that made it.
+A slot and a pocket are milled out of a block, move by move. What stands around the cutter comes from the stock as the
+moves before have left it; every move then has its margin to chatter, and below one it chatters. The part is coloured
+by the margin of the moves that made it.
 """
 
 import tempfile
@@ -73,5 +74,7 @@ slot = ri.MillingProcess(tool.cutter, ri.CuttingCoefficients(8e8, 0.3), ri.Engag
 limit = ri.stability_lobes(ri.TipModes.of(modes), slot, ri.rpm(8000), 15e-3, ri.FullDiscretisation()).limit_depth[0]
 x = removal.path.places[:-1, 0]
 inside = (removal.path.line[1:] == 5) & (x > 0.01) & (x < 0.04)
-print(f"slot: limit {1e3 * limit:.2f} mm, margin {np.median(judged.margin[inside]):.2f}; {np.sum(judged.margin < 1.0)} moves of 1 mm chatter")
+print(
+    f"slot: limit {1e3 * limit:.2f} mm, margin {np.median(judged.margin[inside]):.2f}; {np.sum(judged.margin < 1.0)} moves of 1 mm chatter"
+)
 assert abs(np.median(judged.margin[inside]) / (limit / 6e-3) - 1.0) < 0.02

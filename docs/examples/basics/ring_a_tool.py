@@ -2,8 +2,9 @@
 Ring a tool on a string
 =======================
 
-A drawing does not tell the stiffness of the clamping or the true diameter of the flutes. Hung on a string and tapped, a tool in its holder
-rings at frequencies that do, and a phone hears them. Here the sound is synthesised from a tooling that differs from its drawing.
+A drawing does not tell the stiffness of the clamping or the true diameter of the flutes. Hung on a string and tapped,
+a tool in its holder rings at frequencies that do, and a phone hears them. Here the sound is synthesised from a
+tooling that differs from its drawing.
 """
 
 import tempfile

@@ -2,8 +2,9 @@
 A milling robot at one posture and along a line
 ===============================================
 
-A robot is a machine with a posture. The Stäubli TX200 is described by its joints, links and springs; at a posture it carries a spindle and a tool
-like any machine, and has lobes. Along a line the posture changes, and the limits with it.
+A robot is a machine with a posture. The Stäubli TX200 is described by its joints, links and springs; at a posture it
+carries a spindle and a tool like any machine, and has lobes. Along a line the posture changes, and the limits with
+it.
 """
 
 import matplotlib.pyplot as plt
@@ -48,7 +49,8 @@ right.set(xlabel="spindle speed [rev/min]", ylabel="way along the line [m]", tit
 right.grid(False)
 
 # %%
-# Stretched out the arm is softer, and its own modes limit the cut. Natural frequencies are those that were published for this posture (see the section on published figures).
+# Stretched out the arm is softer, and its own modes limit the cut. The natural frequencies are those that others computed for this
+# posture.
 published = [11.754, 13.651, 22.228, 23.584, 34.867, 55.334]
 print(f"highest limit: {1e3 * limits[0].max():.2f} mm near the base, {1e3 * limits[-1].max():.2f} mm stretched out")
 np.testing.assert_allclose(frequencies[:6], published, rtol=1e-4)

@@ -2,8 +2,9 @@
 Active damping designed with python-control
 ===========================================
 
-The tip's modes leave as a state space, an actuator there feeds the filtered velocity back in both directions, and the closed loop comes
-back as modes that every lobe method takes. A force -c v on a mode adds c / (2 m ω) to its damping ratio.
+The tip's modes leave as a state space, an actuator there feeds the filtered velocity back in both directions, and the
+closed loop comes back as modes that every lobe method takes. A force -c v on a mode adds c / (2 m ω) to its damping
+ratio.
 """
 
 import control

@@ -2,8 +2,8 @@
 What a longer stickout does to the tooltip
 ==========================================
 
-Machine and spindle are known at the flange as five modes; four stickouts of one carbide tool are clamped in front of them by receptance
-coupling. A longer tool is softer, so its peak rises, and slower, so its frequency falls.
+Machine and spindle are known at the flange as five modes; four stickouts of one carbide tool are clamped in front of
+them by receptance coupling. A longer tool is softer, so its peak rises, and slower, so its frequency falls.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 Where a stable cut leaves the wall
 ==================================
 
-A stable cut can still spoil the part: the tool vibrates with the teeth and leaves the wall beside the programmed one. How far depends on the
-spindle speed, and it is worst just where the lobes are highest. Here a finishing cut looks for a speed that has both, depth and form.
+A stable cut can still spoil the part: the tool vibrates with the teeth and leaves the wall beside the programmed one.
+How far depends on the spindle speed, and it is worst just where the lobes are highest. Here a finishing cut looks for
+a speed that has both, depth and form.
 """
 
 import matplotlib.pyplot as plt

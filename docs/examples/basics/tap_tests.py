@@ -2,8 +2,9 @@
 From hits of a hammer to the best cuts
 ======================================
 
-Five hits along X and five along Y, one of them a double hit, are recorded at the tip of a tool. They become receptances with coherence, the
-receptances become lobes, and the lobes a list of cuts, the one that removes most first.
+Five hits along X and five along Y, one of them a double hit, are recorded at the tip of a tool. They become
+receptances with coherence, the receptances become lobes, and the lobes a list of cuts, the one that removes most
+first.
 """
 
 import tempfile

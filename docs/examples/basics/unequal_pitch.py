@@ -2,8 +2,9 @@
 A pitch against chatter
 =======================
 
-Teeth that follow each other at unequal distances disturb regeneration: each meets the wave of the last one at another phase. Which pair
-of angles suits a given spindle speed? Here full discretisation tries a range of them, alternating around a cutter with four teeth.
+Teeth that follow each other at unequal distances disturb regeneration: each meets the wave of the last one at another
+phase. Which pair of angles suits a given spindle speed? Here full discretisation tries a range of them, alternating
+around a cutter with four teeth.
 """
 
 import matplotlib.pyplot as plt
@@ -30,12 +31,14 @@ def cut(first: float) -> ri.MillingProcess:
 angles, speed = np.arange(40.0, 90.5, 2.0), ri.rpm(5000)
 limits = np.array([ri.stability_lobes(tip, cut(a), speed, 0.03, method).limit_depth[0] for a in angles])
 best = angles[np.argmax(limits)]
-print(f"best at {to_rpm(speed):.0f} rev/min: {best:.0f}/{180 - best:.0f} degrees, {1e3 * limits.max():.1f} mm instead of {1e3 * limits[-1]:.1f} mm")
+print(f"best: {best:.0f}/{180 - best:.0f} degrees, {1e3 * limits.max():.1f} mm instead of {1e3 * limits[-1]:.1f} mm")
 
 # %%
 # The gain holds around that speed; elsewhere another pitch would be better.
 speeds = ri.rpm(3500, 9000, 50)
-lobes = {name: ri.stability_lobes(tip, cut(first), speeds, 0.03, method).limit_depth for name, first in (("equal, 90°", 90.0), ("best", best))}
+lobes = {
+    name: ri.stability_lobes(tip, cut(first), speeds, 0.03, method).limit_depth for name, first in (("equal, 90°", 90.0), ("best", best))
+}
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9))
 left.plot(angles, 1e3 * limits, "o-")
 left.plot(best, 1e3 * limits.max(), "o", color="C1", ms=10)

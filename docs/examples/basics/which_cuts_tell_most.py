@@ -2,8 +2,9 @@
 Which four cuts tell most about a machine
 =========================================
 
-A machine of one mode is known to a few percent; each cut shows three harmonics and brings an unknown delay. Out of 97 spindle speeds four are
-chosen so that what they leave open of the receptance is least: those whose harmonics fall on the peak and its flanks.
+A machine of one mode is known to a few percent; each cut shows three harmonics and brings an unknown delay. Out of 97
+spindle speeds four are chosen so that what they leave open of the receptance is least: those whose harmonics fall on
+the peak and its flanks.
 """
 
 import matplotlib.pyplot as plt
@@ -48,7 +49,7 @@ print("chosen [rev/min]:", sorted(np.round(to_rpm(speeds[chosen])).astype(int).t
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9), width_ratios=(1.4, 1.0))
 left.semilogy(to_hz(band), 1e6 * np.abs(h), color="0.5", label="receptance")
-for k, speed in enumerate(sorted(speeds[chosen])):
+for speed in sorted(speeds[chosen]):
     lines = teeth * speed * np.arange(1, 4)
     left.semilogy(to_hz(lines), 1e6 * np.abs(slopes(lines)[1]), "o", ms=8, label=f"{to_rpm(speed):.0f} rev/min")
 left.set(xlabel="frequency [Hz]", ylabel="receptance [µm/N]", xlim=(550, 2450), title="Lines of the chosen cuts")

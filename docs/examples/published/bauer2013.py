@@ -1,9 +1,12 @@
 """
-Bauer and others 2013: what a KUKA KR210 gives way
-==================================================
+Bauer and others 2013: how far a KUKA KR210 gives way
+=====================================================
 
-Natural frequencies of the robot and its give under 100 N were measured, and its model was published [bauer2013], [friedmann2011]. A force of a
-slot moves the tool by four tenths of a millimetre; commanding the posture that gives way onto the right place takes it out.
+Natural frequencies of the robot and its deflection under 100 N were measured, and its model was published. The force
+of a slot moves the tool by four tenths of a millimetre; a posture that is commanded a little aside, so that the tool
+gives way onto the right place, takes that out.
+
+Sources: :cite:`bauer2013`, :cite:`friedmann2011`.
 """
 
 from dataclasses import replace
@@ -40,7 +43,11 @@ def off(commanded: np.ndarray) -> np.ndarray:
     return reached(tight, commanded, push)[0] - place
 
 
-ways = {"as programmed": posture, "mirrored once": mirrored_postures(tight, posture, push), "ahead of the force": ahead_of_forces(tight, posture, push)}
+ways = {
+    "as programmed": posture,
+    "mirrored once": mirrored_postures(tight, posture, push),
+    "ahead of the force": ahead_of_forces(tight, posture, push),
+}
 left_over = {name: np.linalg.norm(off(commanded)) for name, commanded in ways.items()}
 
 # %%
@@ -55,7 +62,7 @@ right.invert_yaxis()
 right.set(xscale="log", xlabel="tool beside its place [µm]", title="Under the force of a slot")
 
 # %%
-# The model is within 12 % of the measured modes and within a tenth of the measured give; both compensations leave less than 0.1 µm.
+# The model is within 12 % of the measured modes and within a tenth of the measured deflection; both compensations leave less than 0.1 µm.
 assert np.max(np.abs(every / measured - 1.0)) < 0.12
 assert abs(across / 0.25e-3 - 1.0) < 0.10
 np.testing.assert_allclose(1e3 * off(posture), [-0.025, -0.387, 0.009], atol=6e-4)

@@ -2,9 +2,11 @@
 Du and others 2023: a robot's tool that the cut bends
 =====================================================
 
-A milling robot is soft: the cut bends the tool away, so that teeth enter later, and the worn flank damps [du2023]. Both lift the limit. At
-8200 rev/min the publication tells by how much: a quarter. What it leaves open, diameter and compliance of the machine, is taken here
-as 10 mm of solid carbide and 0.26 µm/N.
+A milling robot is soft: the cut bends the tool away, so that teeth enter later, and the worn flank damps. Both lift
+the limit. At 8200 rev/min the publication tells by how much: a quarter. What it leaves open, diameter and compliance
+of the machine, is taken here as 10 mm of solid carbide and 0.26 µm/N.
+
+Source: :cite:`du2023`.
 """
 
 import matplotlib.pyplot as plt
@@ -34,7 +36,11 @@ at_8200 = {name: ri.stability_lobes(tip, cut, ri.rpm(8200), 20e-3, method).limit
 edge = deflected_edge(sharp, bent, ri.rpm(10_000), 6.85e-3)
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0), width_ratios=(1.5, 1.0))
 for name in ("rigid, sharp", "bent and damped"):
-    left.plot(to_rpm(speeds), 1e3 * ri.stability_lobes(tip, cuts[name], speeds, 10e-3, ri.FullDiscretisation(tolerance=1e-2)).limit_depth, label=name)
+    left.plot(
+        to_rpm(speeds),
+        1e3 * ri.stability_lobes(tip, cuts[name], speeds, 10e-3, ri.FullDiscretisation(tolerance=1e-2)).limit_depth,
+        label=name,
+    )
 left.axvline(8200.0, color="0.5", ls="--", lw=1.0)
 left.set(xlabel="spindle speed [rev/min]", ylabel="stability limit [mm]", ylim=(0.0, 9.0), title="Lobes")
 left.legend()

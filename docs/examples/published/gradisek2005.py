@@ -2,8 +2,10 @@
 Gradišek and others 2005: four modes, half immersion
 ====================================================
 
-A mill of four modes, three along X and one along Y, cuts half-immersed in down-milling with four teeth [gradisek2005]. Exact methods and the
-zero-order method stand beside each other; reference limits are those of spectral elements.
+A mill of four modes, three along X and one along Y, cuts half-immersed in down-milling with four teeth. Exact methods
+and the zero-order method stand beside each other; reference limits are those of spectral elements.
+
+Source: :cite:`gradisek2005`.
 """
 
 import matplotlib.pyplot as plt
@@ -46,4 +48,4 @@ ax.legend(loc="upper left")
 for name, limit in found.items():
     print(f"{name:<20} {np.round(limit, 5).tolist()} mm, off by at most {100 * np.max(np.abs(limit / reference - 1.0)):.3f} %")
 np.testing.assert_allclose(found["MultiFrequency"], reference, rtol=1e-3)
-np.testing.assert_allclose(found["FullDiscretisation"], reference, rtol=5e-4)
+assert np.max(np.abs(found["FullDiscretisation"] / reference - 1.0)) < 1e-5

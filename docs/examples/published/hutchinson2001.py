@@ -2,9 +2,11 @@
 Hutchinson 2001: a carbide shank as a Timoshenko beam
 =====================================================
 
-Tools and holders are Timoshenko beams here; their shear coefficient may be that of [hutchinson2001]. Natural frequencies of a clamped shank are
-then the roots of a determinant, known to as many digits as wanted. Finite elements [friedman1993] with two freedoms inside come closer
-to them with the fourth power of their length.
+Tools and holders are Timoshenko beams here; their shear coefficient may be Hutchinson's. Natural frequencies of a
+clamped shank are then the roots of a determinant, known to as many digits as wanted. Finite elements with two
+freedoms inside come closer to them with the fourth power of their length.
+
+Sources: :cite:`hutchinson2001`, :cite:`friedman1993`.
 """
 
 import matplotlib.pyplot as plt
@@ -34,7 +36,8 @@ def clamped(highest: float, pieces: int) -> tuple[Structure, np.ndarray, np.ndar
 
 
 # %%
-# More and more elements.
+# More and more elements; the lowest mode is met to the printed digits from the start.
+# Halving the elements divides the error by sixteen, until the digits of the roots end.
 counts, errors = [], []
 for pieces in (1, 2, 4, 8, 16):
     structure, found, _ = clamped(1.0, pieces)
@@ -42,7 +45,7 @@ for pieces in (1, 2, 4, 8, 16):
     errors.append(np.abs(found / roots - 1.0))
 errors = np.array(errors)
 fig, ax = plt.subplots()
-for k in range(5):
+for k in range(1, 5):
     ax.loglog(counts, errors[:, k], "o-", label=f"mode {k + 1}, {roots[k]:.0f} Hz")
 ax.set(xlabel="degrees of freedom [-]", ylabel="relative error of the natural frequency [-]", title="Clamped carbide shank, Ø12 × 100 mm")
 ax.legend()
@@ -50,5 +53,5 @@ ax.legend()
 # %%
 # The last mesh meets all five roots to the printed digits.
 print("found [Hz]:", np.round(found, 4).tolist())
-np.testing.assert_allclose(found, roots, rtol=1e-6)
-assert np.all(np.diff(errors[:3], axis=0) < 0.0)
+np.testing.assert_allclose(found, roots, rtol=6e-8)
+assert np.all(np.log2(errors[0, 1:] / errors[1, 1:]) > 3.5)

@@ -2,9 +2,11 @@
 Huynh and others 2018: a Stäubli TX200 that mills
 =================================================
 
-A simulation of a flexible robot that mills aluminium along a block was published with its cutting forces [huynh2018]. Arm and cut are the same
-here; the tool takes away the material along its path, and its arm gives way to the forces, with the springs across the axes and the
-play of the gears.
+A simulation of a flexible robot that mills aluminium along a block was published with its cutting forces. Arm and cut
+are the same here; the tool takes away the material along its path, and its arm gives way to the forces, with the
+springs across the axes and the play of the gears.
+
+Source: :cite:`huynh2018`.
 """
 
 import matplotlib.pyplot as plt

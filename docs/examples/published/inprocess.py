@@ -2,9 +2,11 @@
 The in-process method: its printed modes of a spindle
 =====================================================
 
-Modes of a machine and its spindle, identified from cuts by a genetic algorithm, were printed together with what chattered in a validation
-[inprocess]. Here those of Y carry a nominal drawing of its second tooling. Two things come out: which way the printed slopes
-count, and that some printed modes feed energy in.
+Modes of a machine and its spindle, identified from cuts by a genetic algorithm, were printed together with what
+chattered in a validation. Here those of Y carry a nominal drawing of its second tooling. Two things come out: which
+way the printed slopes count, and that some printed modes feed energy in.
+
+Source: :cite:`inprocess`.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +23,8 @@ from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.units import to_hz
 
 # %%
-# Table A.5: frequency [Hz], damping [%], Re and Im of translation [1e-4 sqrt(s/kg)] and slope [1e-4 rad sqrt(s/(kg m²))]; joint of table A.6.
+# Table A.5: frequency [Hz], damping [%], Re and Im of translation [1e-4 sqrt(s/kg)] and slope [1e-4 rad sqrt(s/(kg m²))]; the
+# joint is that of table A.6.
 printed = """
  600.0 20.0 -15.3  14.3 -153.3 -143.7
  894.8 12.3  -8.7   8.7  -87.5  -87.5

@@ -2,9 +2,11 @@
 Insperger and Stépán 2004: the mill with two teeth
 ==================================================
 
-The mill that most of the literature on milling stability begins with [insperger2004]: two teeth, one mode of 922 Hz, a slot. Semi-discretisation
-was published with it. The chart is drawn here, and its multipliers and limits stand beside those of spectral elements that two
-resolutions give alike to 7e-9.
+The mill that most of the literature on milling stability begins with: two teeth, one mode of 922 Hz, a slot.
+Semi-discretisation was published with it. The chart is drawn here, and its multipliers and limits stand beside those
+of spectral elements that two resolutions give alike to 7e-9.
+
+Source: :cite:`insperger2004`.
 """
 
 import matplotlib.pyplot as plt

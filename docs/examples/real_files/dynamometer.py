@@ -2,16 +2,17 @@
 Cutting coefficients from a real dynamometer
 ============================================
 
-Three full slots in aluminium at 300, 900 and 1500 mm/min, forces exported by the dynamometer's own program (leekunhwee/ForceCalculation on
-GitHub). The channels are told as its housing names them, but the feed lay along its Y; which channel shows which axis is found from
-the cuts. With five feeds and axes put right by hand, 959 ± 140 MPa were published.
+Three full slots in aluminium at 300, 900 and 1500 mm/min, forces exported by the dynamometer's own program
+(leekunhwee/ForceCalculation on GitHub). The channels are told as its housing names them, but the feed lay along its
+Y; which channel shows which axis is found from the cuts. With five feeds and axes put right by hand, 959 ± 140 MPa
+were published.
 """
 
 from functools import partial
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.io.recordings import read_cut

@@ -2,13 +2,14 @@
 Tap tests of a face mill
 ========================
 
-Hits of a hammer along X and Y at the tip of a face mill, measured by others (leekunhwee/Dynamics on GitHub), exported as text as CutPro
-exchanges it. From the two files follow the stability lobes in steel; the lowest limit was published with them.
+Hits of a hammer along X and Y at the tip of a face mill, measured by others (leekunhwee/Dynamics on GitHub), exported
+as text as CutPro exchanges it. From the two files follow the stability lobes in steel; the lowest limit was published
+with them.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.units import to_hz, to_rpm
@@ -27,8 +28,12 @@ if files:
     top.set(xlabel="frequency [Hz]", ylabel="receptance [µm/N]", xlim=(100, 4000), ylim=(0.01, 4.0), title="Measured at the tip")
     top.legend()
     bottom.plot(to_rpm(lobes.spindle_speed), 1e3 * lobes.limit_depth, color="C2")
-    bottom.axhline(1e3 * lobes.absolute_limit, color="0.4", ls="--", lw=1.0, label=f"stable at any speed: {1e3 * lobes.absolute_limit:.3f} mm")
-    bottom.set(xlabel="spindle speed [rev/min]", ylabel="stability limit [mm]", ylim=(0.0, 10.0), title="Half-immersion down-milling of steel")
+    bottom.axhline(
+        1e3 * lobes.absolute_limit, color="0.4", ls="--", lw=1.0, label=f"stable at any speed: {1e3 * lobes.absolute_limit:.3f} mm"
+    )
+    bottom.set(
+        xlabel="spindle speed [rev/min]", ylabel="stability limit [mm]", ylim=(0.0, 10.0), title="Half-immersion down-milling of steel"
+    )
     bottom.legend()
 
     limit, frequency = 1e3 * lobes.absolute_limit, to_hz(lobes.absolute_frequency)

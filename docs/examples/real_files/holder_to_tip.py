@@ -3,15 +3,16 @@ From hits on the holder to the tip
 ==================================
 
 On a real machining centre the hammer hit the collet's nut and the holder's flange, with the accelerometer at the tip
-(leekunhwee/Vibration-Signal-Processing on GitHub). From these two FRFs alone the machine behind the flange is identified, and the tip's own
-FRF predicted; the hit on the tip itself is laid beside it. The drawing is read off a photograph, and that the tool is of carbide is told.
+(leekunhwee/Vibration-Signal-Processing on GitHub). From these two FRFs alone the machine behind the flange is
+identified, and the tip's own FRF predicted; the hit on the tip itself is laid beside it. The drawing is read off a
+photograph, and that the tool is of carbide is told.
 """
 
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.io.frf_files import read_frfs
@@ -32,9 +33,7 @@ if files:
 
     # each test: the response at the tip, the force so far from it; by reciprocity the same as the other way around
     places = {"nut": (0.090, files[0]), "V-flange": (0.165, files[1])}
-    tests = tuple(
-        HammerTest(name, "T", ri.Dof.X, 0.0, place, Path(file), band=(200.0, 3300.0)) for name, (place, file) in places.items()
-    )
+    tests = tuple(HammerTest(name, "T", ri.Dof.X, 0.0, place, Path(file), band=(200.0, 3300.0)) for name, (place, file) in places.items())
     found = ri.identify(Campaign("real machine", None, (), None, {"T": tooling}, (), tests=tests), seed=1, processes=1)
     print(found)
 

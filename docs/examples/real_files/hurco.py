@@ -2,16 +2,16 @@
 Twelve recordings of two machining centres
 ==========================================
 
-Accelerometers on two Hurco machining centres recorded cuts in steel and aluminium, a ramp of the speed, and one run in the air
-(Yang51st/Machining-Chatter-Detection-Program on GitHub). Nothing is set: speed, teeth and verdict come out of each file, and the speed that its
-name tells stands beside.
+Accelerometers on two Hurco machining centres recorded cuts in steel and aluminium, a ramp of the speed, and one run
+in the air (Yang51st/Machining-Chatter-Detection-Program on GitHub). Nothing is set: speed, teeth and verdict come out
+of each file, and the speed that its name tells stands beside.
 """
 
 import re
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.units import to_rpm
@@ -46,7 +46,8 @@ if files:
         share = heard[k].explained_share
         ax.barh(row, away[k], color=colours[str(heard[k].verdict)])
         ax.text(0.01, row, f"{heard[k].verdict}, orders explain {100 * share:.0f} %", va="center", fontsize=8)
-    ax.set(yticks=range(rows.size), yticklabels=[f"{named[k]:.0f} rev/min, {parts[k].split('__')[1][:18]}" for k in rows])
+    ax.set(yticks=range(rows.size), yticklabels=[parts[k].split("__")[-1][:34] for k in rows])
+    ax.tick_params(axis="y", labelsize=8)
     ax.set(xlabel="true speed over programmed speed, minus 1 [%]", xlim=(-0.27, 0.2), title="Heard without any setting")
     ax.invert_yaxis()
 

@@ -3,12 +3,13 @@ One real hit of a hammer
 ========================
 
 A hit on the tip of an end mill on a machining centre, force and acceleration over one second, recorded by others
-(leekunhwee/Vibration-Signal-Processing on GitHub). The recording becomes a receptance; beside it stands the one that its authors made.
+(leekunhwee/Vibration-Signal-Processing on GitHub). The recording becomes a receptance; beside it stands the one that
+its authors made.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.io.frf_files import read_frfs

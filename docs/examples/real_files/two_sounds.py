@@ -3,14 +3,14 @@ Two sounds of a face mill
 =========================
 
 Others recorded a face mill with six teeth by a microphone, once chattering and once not
-(hafeztrimukti29/chatter-detection-using-accoustic-approach-and-once-per-revolution-variance on GitHub). What does the first sound advise, and did
-the second follow it?
+(hafeztrimukti29/chatter-detection-using-accoustic-approach-and-once-per-revolution-variance on GitHub). What does the
+first sound advise, and did the second follow it?
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
 import scipy.signal
-from _files import real_files
+from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.units import to_rpm

@@ -15,7 +15,7 @@ def real_files(address: str, figure: str, *names: str) -> list[Path]:
         return paths
     print(f"The files are not here. They can be downloaded from {address}; this example looks for them beside the project, as")
     print("\n".join(f"  shared/data/{name}" for name in names))
-    image = plt.imread(Path("figures") / figure)
+    image = plt.imread(Path(__file__).parent / figure)
     size = image.shape[1] / 100.0, image.shape[0] / 100.0
     axes = plt.figure(figsize=size, dpi=100, layout="none").add_axes((0.0, 0.0, 1.0, 1.0))
     axes.imshow(image)
