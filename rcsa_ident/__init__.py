@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
     from rcsa_ident.machining_setup import CutSpec, Tooling
+    from rcsa_ident.recorded import listen, ring, tap
     from rcsa_ident.samples import sample_robot, sample_tooling
     from rcsa_ident.signals.recording import Quantity, Sensor
     from rcsa_ident.stability.full_discretisation import FullDiscretisation
@@ -56,15 +57,12 @@ if TYPE_CHECKING:
         connect,
         estimate_forces,
         identify,
-        listen,
         plot_lobes,
         read_machine,
         read_modes,
         read_result,
         read_tap_tests,
-        ring,
         sample_campaign,
-        tap,
     )
 
 __all__ = [
@@ -151,6 +149,7 @@ _ROOMS = {
     "machine.robot.flexible": ("FlexibleRobot",),
     "machine.robot.posed_robot": ("PosedRobot",),
     "machining_setup": ("CutSpec", "Tooling"),
+    "recorded": ("listen", "ring", "tap"),
     "samples": ("sample_robot", "sample_tooling"),
     "signals.recording": ("Quantity", "Sensor"),
     "stability.full_discretisation": ("FullDiscretisation",),
@@ -165,8 +164,8 @@ _ROOMS = {
     "tool_holder.geometry": ("MATERIALS", "BeamSegment", "Contact", "clamped"),
     "units": ("hz", "rpm"),
     "verbs": (
-        "advise", "connect", "estimate_forces", "identify", "listen", "plot_lobes", "read_machine", "read_modes", "read_result",
-        "read_tap_tests", "ring", "sample_campaign", "tap",
+        "advise", "connect", "estimate_forces", "identify", "plot_lobes", "read_machine", "read_modes", "read_result", "read_tap_tests",
+        "sample_campaign",
     ),
 }  # fmt: skip
 _HOME = {name: f"rcsa_ident.{room}" for room, names in _ROOMS.items() for name in names}

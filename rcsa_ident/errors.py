@@ -20,6 +20,15 @@ class InputError(RcsaIdentError, ValueError):
         What may stand there, in words, with its unit.
     where : str, optional
         The file (and line) where it stood.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> try:
+    ...     ri.rpm(-1)
+    ... except ri.InputError as error:
+    ...     print(error)
+    value: found -1, allowed is a finite number greater than 0 [rev/min]
     """
 
     def __init__(self, field: str, found: object, allowed: str, where: str = "") -> None:
@@ -35,7 +44,14 @@ class InputError(RcsaIdentError, ValueError):
         return type(self), (self.field, self.found, self.allowed, self.where)
 
     def at(self, where: str) -> InputError:
-        """Return the same error with the file named in which it stood."""
+        """Return the same error with the file named in which it stood.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> print(ri.InputError("teeth", 0, "1 or more").at("TOOL.toml"))
+        TOOL.toml: teeth: found 0, allowed is 1 or more
+        """
         return type(self)(self.field, self.found, self.allowed, where)
 
 

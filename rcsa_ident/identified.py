@@ -37,6 +37,17 @@ class Result(Drawn):
         That was identified, where it is at hand.
     readings : tuple of Reading
         Of every cut of the campaign, with the verdicts.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.read_result("RESULT.json")
+    >>> print(found)
+    converged, 20 cuts, X 7 modes, Y 8 modes
+    >>> print(found.modes[ri.Dof.X])
+    flange.x, flange.x': 7 modes at 202, 997, 1805, 2310, 2382, 3039, 3937 Hz
+    >>> len(found.left_out)
+    0
     """
 
     data: Mapping[str, Any]

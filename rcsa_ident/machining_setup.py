@@ -56,6 +56,15 @@ class Tooling(Saved):
     ------
     InputError
         If something about them is impossible, each taken for itself or all together.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> tool = ri.sample_tooling("S3-PG25-long")
+    >>> print(tool)
+    S3-PG25-long: 4 teeth, Ø12 mm, helix 30°, stickout 65.9 mm, insertion 44 mm, holder 100 mm
+    >>> tool.cutter.teeth, round(1e3 * tool.assembly.stickout, 1)
+    (4, 65.9)
     """
 
     name: str
@@ -190,6 +199,13 @@ class CutSpec(Shown):
         ------
         InputError
             If the cutting coefficients are not known, the run-out does not fit the teeth, or the cutter does not reach the stock.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> cut = ri.CutSpec(material="EN AW-6082", feed_per_tooth=0.1e-3)
+        >>> print(cut.process(ri.sample_tooling("S1-ER32").cutter))
+        4 teeth, Ø12 mm, helix 30°; K_tc 902 MPa, k_rc 0.26; 90° to 180°, feed +X, 0.1 mm per tooth
         """
         if self.runout is not None:
             if len(self.runout) != cutter.teeth:
@@ -345,6 +361,16 @@ class Campaign(Shown):
         Standard deviation of the axial depth, the same in all cuts of a tooling. It counts where something of the drawings is not exact.
     softening_spread : float [-]
         Standard deviation of the stiffness' change from the middle to the end of the speeds, as a share.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> campaign = ri.read_campaign("data/sample_runs")
+    >>> cut = campaign.cuts[0]
+    >>> cut.id, cut.tooling, round(cut.conditions.spindle_speed, 1)
+    ('S1-ER32-00', 'S1-ER32', 837.8)
+    >>> print(campaign.workpiece)
+    EN AW-6082: K_tc 902 MPa, k_rc 0.26
     """
 
     name: str

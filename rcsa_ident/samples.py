@@ -52,7 +52,18 @@ def simulate_campaign(
 
 
 def sample_robot(name: str) -> RobotModel:
-    """Return a published arm: ``tx200``, ``kr210`` or ``kr500``, which has no masses."""
+    """Return a published arm: ``tx200``, ``kr210`` or ``kr500``, which has no masses.
+
+    Parameters
+    ----------
+    name : str
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> print(ri.sample_robot("tx200"))
+    Stäubli TX200: 6 joints, 18 freedoms, 1045 kg
+    """
     known = sample_robots()
     if name not in known:
         raise InputError("robot", name, f"one of {', '.join(known)}")
@@ -65,7 +76,18 @@ def sample_toolings() -> dict[str, Path]:
 
 
 def sample_tooling(name: str) -> Tooling:
-    """Return a tooling of the sample machine, as ``S3-PG25-long``, which no sample campaign cuts with."""
+    """Return a tooling of the sample machine, as ``S3-PG25-long``, which no sample campaign cuts with.
+
+    Parameters
+    ----------
+    name : str
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> print(ri.sample_tooling("S3-PG25-long"))
+    S3-PG25-long: 4 teeth, Ø12 mm, helix 30°, stickout 65.9 mm, insertion 44 mm, holder 100 mm
+    """
     known = sample_toolings()
     if name not in known:
         raise InputError("tooling", name, f"one of {', '.join(known)}")

@@ -78,6 +78,14 @@ def rpm(first: float, last: float, step: float) -> NDArray[Any]: ...
 def rpm(first: float, last: float | None = None, step: float | None = None) -> Any:
     """Return a spindle speed, or the speeds from the first to the last one, in rad/s from rev/min.
 
+    Parameters
+    ----------
+    first : float [rev/min]
+    last, step : float, optional [rev/min]
+        Both or neither; the last one is among the speeds where the steps meet it.
+
+    Examples
+    --------
     >>> round(rpm(12_000), 3)
     1256.637
     >>> to_rpm(rpm(4000, 5000, 250), 6).tolist()
@@ -93,6 +101,14 @@ def hz(first: float, last: float, step: float) -> NDArray[Any]: ...
 def hz(first: float, last: float | None = None, step: float | None = None) -> Any:
     """Return an angular frequency, or those from the first to the last one, in rad/s from hertz.
 
+    Parameters
+    ----------
+    first : float [Hz]
+    last, step : float, optional [Hz]
+        Both or neither; the last one is among the frequencies where the steps meet it.
+
+    Examples
+    --------
     >>> round(hz(50.0), 3)
     314.159
     >>> to_hz(hz(100.0, 300.0, 100.0)).round(9).tolist()

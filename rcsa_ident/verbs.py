@@ -9,7 +9,7 @@ import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -26,13 +26,10 @@ if TYPE_CHECKING:
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.identification.method import Method
-    from rcsa_ident.identification.ringing import RungTooling
     from rcsa_ident.identified import Result
     from rcsa_ident.machine.machine import Machine, TipSource
     from rcsa_ident.observer.tuning import ObserverMethod
-    from rcsa_ident.signals.listening import Listening
-    from rcsa_ident.signals.recording import Quantity, Recording
-    from rcsa_ident.signals.tap import HitEstimator, TapFrf
+    from rcsa_ident.signals.recording import Recording
     from rcsa_ident.stability.advice import Advice
     from rcsa_ident.stability.methods import StabilityMethod
     from rcsa_ident.stability.result import StabilityLobes
@@ -52,6 +49,13 @@ def sample_campaign(folder: str | Path = "sample_runs", processes: int | None = 
         What is true of the machine goes beside it, into ``<folder>.truth``.
     processes, progress
         As of `identify`.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> campaign = ri.sample_campaign("sample_runs")
+    >>> sorted(campaign.toolings)
+    ['S1-ER32', 'S2-PG25']
     """
     from rcsa_ident.io.setups import read_campaign
     from rcsa_ident.processes import workers
@@ -90,6 +94,15 @@ def identify(
     ------
     InputError
         If no cut is usable.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.identify("sample_runs", seed=1)
+    >>> print(found)
+    converged, 20 cuts, X 7 modes, Y 8 modes
+    >>> print(found.save("RESULT.json"))
+    RESULT.json
     """
     from functools import partial
 
@@ -131,7 +144,21 @@ def _method(method: Method | str, start: Result | IdentifiedMachine | None) -> M
 
 
 def read_result(path: str | Path) -> Result:
-    """Return the identification of RESULT.json: status, reasons, modes, and the machine."""
+    """Return the identification of RESULT.json: status, reasons, modes, and the machine.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.read_result("RESULT.json")
+    >>> print(found.status)
+    converged
+    >>> print(found.machine)
+    HPM sample machine: X 7 modes, Y 8 modes, 533 to 4266 Hz, converged
+    """
     from rcsa_ident.identified import Result
     from rcsa_ident.io import results
 
@@ -139,14 +166,42 @@ def read_result(path: str | Path) -> Result:
 
 
 def read_machine(path: str | Path) -> Machine:
-    """Return the machine of RESULT.json, or of FLANGE.csv: a flange that was measured or decoupled."""
+    """Return the machine of RESULT.json, or of FLANGE.csv: a flange that was measured or decoupled.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> machine = ri.read_machine("RESULT.json")
+    >>> print(machine)
+    HPM sample machine: X 7 modes, Y 8 modes, 533 to 4266 Hz, converged
+    >>> print(machine.tip(ri.sample_tooling("S3-PG25-long")))
+    tip.x, tip.y: 4167 frequencies, 100 to 4266 Hz, with its spread
+    """
     from rcsa_ident.io.flanges import read_flange_machine
 
     return read_flange_machine(path) if Path(path).suffix.lower() == ".csv" else read_result(path).machine
 
 
 def read_modes(path: str | Path) -> TipModes:
-    """Return the modes of a tip from MODES.toml; a direction without modes is rigid."""
+    r"""Return the modes of a tip from MODES.toml; a direction without modes is rigid.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> from pathlib import Path
+    >>> text = "[[y]]\nnatural_frequency_hz = 900.0\ndamping_ratio = 0.02\nmodal_mass_kg = 0.04"
+    >>> _ = Path("MODES.toml").write_text(text)
+    >>> print(ri.read_modes("MODES.toml"))
+    tip: 1 mode at 900 Hz
+    """
     from rcsa_ident.io import modes
     from rcsa_ident.stability.tip_modes import TipModes
 
@@ -170,6 +225,12 @@ def read_tap_tests(
         Response in the first direction, force in the second one.
     units : str, optional
         As ``um/N`` or ``(m/s^2)/N``, whatever the files say; by default as they say.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> print(ri.read_tap_tests(y=ri.tap("hits.csv", axis="Y").save("TIP.csv")))
+    tip.x, tip.y: 12569 frequencies, 2 to 25600 Hz
     """
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io import frf_files
@@ -209,9 +270,16 @@ def advise(
     drive : SpindleDrive, optional
         Power, torque and highest speed of the spindle.
     depth : float [m], optional
-        At which speeds may one cut so deep?
+        Speeds at which one may cut so deep are told.
     planned : sequence of (speed [rad/s], depth [m])
-        How far are these cuts from chatter?
+        How far these cuts are from chatter is told.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+    >>> print(ri.advise(machine, tool, ri.CutSpec(feed_per_tooth=0.1e-3), ri.rpm(8000, 16_000, 100)))
+    S3-PG25-long: 14456 rev/min: stability limit 1.93 mm, recommended 1.55 mm, 54 cm³/min, 0.81 kW
     """
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.identified import Result
@@ -251,6 +319,13 @@ def estimate_forces(
     method : ObserverMethod, default Resonators()
     smooth : bool
         Every sample given the whole record, without lag; else as it would be live.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
+    >>> print(ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15]))
+    X 6.62 N rms (± 2.9 N), Y 12.7 N rms (± 3.9 N) over 0.22 s, 14182 rev/min, 373 to 4266 Hz
     """
     from rcsa_ident.identified import Result
     from rcsa_ident.workflows.estimate_forces import METHOD, observe
@@ -277,130 +352,6 @@ def _recording(machine: Machine, given: Recording | str | Path) -> Recording:
     return read_recording(given, machine.sensors)
 
 
-def listen(
-    recording: str | Path,
-    channels: Sequence[str] = (),
-    quantity: Quantity | str | None = None,
-    teeth: int | None = None,
-    speed: float | None = None,
-    between: tuple[float, float] | None = None,
-    rate: float | None = None,
-) -> Listening:
-    """Return what a recording of any sensor says by itself: the spindle's speed, whether it cuts stably or chatters, speeds to try.
-
-    Parameters
-    ----------
-    recording : path
-        Of any format that a campaign reads, or a text table.
-    channels : sequence of str
-        That are listened to; by default all of one quantity, of a sound the first.
-    quantity : Quantity or str, optional
-        What they measure where the file does not say: acceleration, sound, displacement or force.
-    teeth : int, optional
-        By default as they are heard.
-    speed : float, optional [rad/s]
-        As programmed; the true one is looked for near it.
-    between : (float, float), optional [rad/s]
-        Speeds that the machine may turn at.
-    rate : float, optional [Hz]
-        Of a file that tells none.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, does not tell what is needed, or says nothing at all.
-    """
-    from rcsa_ident.io.open_recording import open_recording
-    from rcsa_ident.signals.recording import Quantity
-    from rcsa_ident.workflows.listen import listen_to
-
-    path, known = Path(recording), [str(each) for each in Quantity]
-    if quantity is not None and quantity not in known:
-        raise InputError("quantity", quantity, ", ".join(known))
-    opened = open_recording(path, channels, rate)
-    measured, chosen = opened.of(None if quantity is None else Quantity(quantity), channels)
-    with _one_thread():
-        answer = listen_to(opened.rate, [each.samples for each in chosen], measured, teeth, speed, between, path.name)
-    return replace(answer, reasons=(*answer.reasons, *opened.remarks))
-
-
-def tap(
-    *recordings: str | Path,
-    force: str | None = None,
-    response: str | None = None,
-    quantity: str = "acceleration",
-    estimator: HitEstimator | str = "h1",
-    sensor_mass: float = 0.0,
-    axis: str = "X",
-    rate: float | None = None,
-) -> TapFrf:
-    """Return the receptance of a structure that was hit by a hammer; double hits, overloads and others are left out and named.
-
-    Parameters
-    ----------
-    *recordings : path
-        One with several hits, or several files.
-    force, response : str, optional
-        Names of the channels; by default the hammer is told by its pulses, and the response is the only other one.
-    quantity : str
-        What the response measures where its unit does not say: acceleration, velocity or displacement.
-    estimator : HitEstimator or str
-        h1, h2, or hv for their mean.
-    sensor_mass : float [kg]
-        Of a sensor at the point that is hit.
-    axis : str
-        Machine axis of hammer and response, X or Y.
-    rate : float, optional [Hz]
-        Of files that tell none.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read, or no hit can be used; the message says why of each.
-    """
-    from rcsa_ident.io.open_recording import open_recording
-    from rcsa_ident.signals.tap import HitEstimator
-    from rcsa_ident.workflows.tap import tap_recordings
-
-    known = [str(each) for each in HitEstimator]
-    if estimator not in known:
-        raise InputError("estimator", estimator, ", ".join(known))
-    if axis not in ("X", "Y"):
-        raise InputError("axis", axis, "X or Y")
-    opened = [open_recording(path, [name for name in (force, response) if name], rate) for path in recordings]
-    with _one_thread():
-        return tap_recordings(opened, force, response, quantity, HitEstimator(estimator), sensor_mass, axis)[0]
-
-
-def ring(
-    tooling: Tooling | str | Path,
-    *sounds: str | Path,
-    bare_tool: Sequence[str | Path] = (),
-    mass: float | None = None,
-    rate: float | None = None,
-) -> RungTooling:
-    """Return a tooling learned from how it rings: hung on a string, tapped, and recorded with a phone beside it.
-
-    Parameters
-    ----------
-    tooling : Tooling or path
-    *sounds : path
-        Of the tool in its holder, one with several hits, or several files.
-    bare_tool, mass : sequence of path, float [kg]
-        Of the tool alone.
-    rate : float, optional [Hz]
-        Of files that tell none.
-    """
-    from rcsa_ident.io.open_recording import open_recording
-    from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.ring import ring_tooling
-
-    tooling = tooling if isinstance(tooling, Tooling) else read_tooling(tooling)
-    heard, alone = ([open_recording(path, (), rate) for path in paths] for paths in (sounds, bare_tool))
-    with _one_thread():
-        return ring_tooling(tooling, heard, alone, mass)
-
-
 def plot_lobes(lobes: StabilityLobes, **options: Any) -> Figure:
     """Return the figure of stability lobes, as ``lobes.plot()`` draws it.
 
@@ -409,6 +360,15 @@ def plot_lobes(lobes: StabilityLobes, **options: Any) -> Figure:
     lobes : StabilityLobes
     **options
         Of `rcsa_ident.report.lobes.stability_figure`: recommended cuts, tested cuts, a map below them, a surface.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+    >>> ri.plot_lobes(lobes).savefig("lobes.svg")
     """
     from rcsa_ident.report.lobes import stability_figure
 
@@ -428,6 +388,15 @@ def connect(url: str = "http://127.0.0.1:8000", key: str | None = None) -> Any:
     ------
     InputError
         If the package beside this one that is called `api` is another one, or the client's own requirement is not installed.
+
+    Examples
+    --------
+    Nothing is sent before something is asked:
+
+    >>> import rcsa_ident as ri
+    >>> with ri.connect("http://127.0.0.1:8000") as client:
+    ...     print(type(client).__name__)
+    Client
     """
     # by name and late: the library knows nothing of the service (an import contract), only this door opens to it
     try:

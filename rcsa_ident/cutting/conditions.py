@@ -42,7 +42,16 @@ class Engagement(Shown):
 
     @classmethod
     def from_immersion(cls, immersion: float, strategy: str) -> Engagement:
-        """Return the engagement of a radial immersion a_e/D in (0, 1] for ``up`` or ``down`` milling."""
+        """Return the engagement of a radial immersion a_e/D in (0, 1] for ``up`` or ``down`` milling.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> import numpy as np
+        >>> half = ri.Engagement.from_immersion(0.5, "down")
+        >>> np.degrees([half.entry, half.exit]).round(6).tolist()
+        [90.0, 180.0]
+        """
         if not 0.0 < positive("immersion", immersion) <= 1.0:
             raise InputError("immersion", immersion, "radial depth over diameter, above 0 and not above 1")
         if strategy == "up":

@@ -137,7 +137,15 @@ class Cutter(Shown):
         return self.profile is None and self.serration is None and self.tilt == 0.0 and not isinstance(self.helix, np.ndarray)
 
     def running_true(self) -> Cutter:
-        """Return the same without any run-out or tilt; waves stay."""
+        """Return the same without any run-out or tilt; waves stay.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> cutter = ri.Cutter(2, 0.012, runout=[5e-6, -5e-6])
+        >>> cutter.running_true().runout.tolist()
+        [0.0, 0.0]
+        """
         if self.tilt == 0.0 and not self.runout.any() and not self.axial_runout.any():
             return self
         none = np.zeros(self.teeth)

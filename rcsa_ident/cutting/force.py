@@ -134,6 +134,18 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     -----
     A row of edge pushes with a sum of e^{i q phi}, q = -2..2, along its arc, so each line is a sum of integrals of
     e^{i (q - m) phi}; a wall's helix multiplies line m by the mean of e^{-i m 2 z tan(helix) / D} over the depth.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> import numpy as np
+    >>> from rcsa_ident.cutting.force import force_lines
+    >>> half = ri.Engagement.from_immersion(0.5, "down")
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), half, feed_per_tooth=0.1e-3)
+    >>> conditions = cut.conditions(ri.rpm(12_000), 1e-3)
+    >>> lines = force_lines(cut.cutter, conditions, cut.coefficients, np.array([0, 2, 4]))
+    >>> abs(lines).round(1).tolist()
+    [[5.9, 20.8], [12.0, 32.6], [8.7, 15.0]]
     """
     return unit_lines(cutter, conditions, orders) @ _values(coefficients)
 
@@ -313,6 +325,18 @@ def force_history(
     -------
     array, shape (n, 3) [N]
         Force along X, Y and from the spindle towards the tip, -z.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> import numpy as np
+    >>> from rcsa_ident.cutting.force import force_history
+    >>> half = ri.Engagement.from_immersion(0.5, "down")
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), half, feed_per_tooth=0.1e-3)
+    >>> conditions = cut.conditions(ri.rpm(12_000), 1e-3)
+    >>> force = force_history(cut.cutter, conditions, cut.coefficients, np.radians([45.0, 100.0, 135.0]))
+    >>> force[:, :2].round(1).tolist()
+    [[0.0, 0.0], [-8.4, 71.5], [24.5, 45.5]]
     """
     angle = np.asarray(angle, dtype=float)
     total = np.zeros((angle.size, 3))

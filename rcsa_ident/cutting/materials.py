@@ -51,6 +51,11 @@ def materials() -> tuple[CuttingMaterial, ...]:
 def material(name: str) -> CuttingMaterial:
     """Return a material by name, whatever its capitals and spaces.
 
+    Parameters
+    ----------
+    name : str
+        One of `materials()`.
+
     Raises
     ------
     InputError

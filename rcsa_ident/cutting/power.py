@@ -84,6 +84,15 @@ class SpindleDrive(Shown):
         Infinite where nothing is known.
     torque : array, shape (k,) [N m]
     max_speed : float [rad/s]
+
+    Examples
+    --------
+    32 N m up to 6000 rev/min, 20 kW from there on:
+
+    >>> import rcsa_ident as ri
+    >>> drive = ri.SpindleDrive(ri.rpm(1000, 6000, 5000), [3.35e3, 20.1e3], [32.0, 32.0], max_speed=ri.rpm(18_000))
+    >>> print(drive)
+    up to 20.1 kW, up to 32 N m, up to 18000 rev/min
     """
 
     speed: FloatArray
@@ -110,13 +119,27 @@ class SpindleDrive(Shown):
         power : float or None [W]
         torque : float or None [N m]
         max_speed : float or None [rad/s]
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> print(ri.SpindleDrive.flat(power=15e3, max_speed=ri.rpm(24_000)))
+        up to 15 kW, up to 24000 rev/min
         """
         numbers = (("power", power, "W"), ("torque", torque, "N m"), ("max_speed", max_speed, "rad/s"))
         values = [np.inf if value is None else positive(name, value, unit) for name, value, unit in numbers]
         return cls(np.ones(1), np.array([values[0]]), np.array([values[1]]), values[2])
 
     def limited(self, other: SpindleDrive) -> SpindleDrive:
-        """Return the drive that has what both have."""
+        """Return the drive that has what both have.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> drive = ri.SpindleDrive.flat(power=15e3)
+        >>> print(drive.limited(ri.SpindleDrive.flat(torque=40.0)))
+        up to 15 kW, up to 40 N m
+        """
         speed = np.union1d(self.speed, other.speed)
         for name in ("power", "torque"):
             with np.errstate(invalid="ignore"):
@@ -131,11 +154,27 @@ class SpindleDrive(Shown):
         return SpindleDrive(speed, power, torque, min(self.max_speed, other.max_speed))
 
     def power_at(self, speed: FloatArray) -> FloatArray:
-        """Return the power at some speeds [W], 0 beyond the highest speed."""
+        """Return the power at some speeds [W], 0 beyond the highest speed.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> drive = ri.SpindleDrive(ri.rpm(1000, 6000, 5000), [3e3, 18e3], [30.0, 30.0], max_speed=ri.rpm(18_000))
+        >>> drive.power_at(ri.rpm(2000, 20_000, 9000)).round(1).tolist()
+        [6000.0, 18000.0, 0.0]
+        """
         return np.where(np.asarray(speed) <= self.max_speed * (1.0 + 1e-12), _between(speed, self.speed, self.power), 0.0)
 
     def torque_at(self, speed: FloatArray) -> FloatArray:
-        """Return the torque at some speeds [N m], 0 beyond the highest speed."""
+        """Return the torque at some speeds [N m], 0 beyond the highest speed.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> drive = ri.SpindleDrive(ri.rpm(1000, 6000, 5000), [3e3, 18e3], [30.0, 20.0])
+        >>> drive.torque_at(ri.rpm(1000, 6000, 2500)).round(1).tolist()
+        [30.0, 25.0, 20.0]
+        """
         return np.where(np.asarray(speed) <= self.max_speed * (1.0 + 1e-12), _between(speed, self.speed, self.torque), 0.0)
 
     def __str__(self) -> str:

@@ -31,6 +31,21 @@ class ProcessDamping(Shown):
         w, width of the flat behind the edge.
     friction : float [-]
         mu, coefficient of friction between flank and workpiece.
+
+    Examples
+    --------
+    A slow cut with a sharp edge, and with one that is worn by 0.1 mm:
+
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cutter, slot = ri.Cutter(2, 0.012), ri.Engagement.from_immersion(1.0, "up")
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> for damping in (None, ri.ProcessDamping(indentation=1e14, wear_land=0.1e-3)):
+    ...     cut = ri.MillingProcess(cutter, ri.CuttingCoefficients(7e8, 0.3), slot, damping=damping)
+    ...     lobes = ri.stability_lobes(tip, cut, ri.rpm(1500, 1600, 100), 10e-3, ri.FullDiscretisation())
+    ...     print((1e3 * lobes.limit_depth).round(2))
+    [0.72 0.85]
+    [6.33 6.15]
     """
 
     indentation: float
@@ -62,6 +77,21 @@ class SpeedVariation(Shown):
         RVA, above 0 and below 0.9.
     ratio : float [-]
         RVF, swings per revolution.
+
+    Examples
+    --------
+    The speed swings by a tenth, once in five turns:
+
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cutter, slot = ri.Cutter(2, 0.012), ri.Engagement.from_immersion(1.0, "up")
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> for swing in (None, ri.SpeedVariation(amplitude=0.1, ratio=0.2)):
+    ...     cut = ri.MillingProcess(cutter, ri.CuttingCoefficients(7e8, 0.3), slot, speed_variation=swing)
+    ...     lobes = ri.stability_lobes(tip, cut, ri.rpm(3000, 3100, 100), 10e-3, ri.FullDiscretisation())
+    ...     print((1e3 * lobes.limit_depth).round(2))
+    [1.35 0.61]
+    [1.15 1.33]
     """
 
     amplitude: float
@@ -153,6 +183,14 @@ class MillingProcess(Shown):
         ------
         InputError
             If the engagement changes along the edge.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+        >>> conditions = cut.conditions(ri.rpm(12_000), 1e-3)
+        >>> round(conditions.spindle_speed, 1), conditions.axial_depth
+        (1256.6, 0.001)
         """
         if self.engagement_profile is not None:
             raise InputError("engagement_profile", "an engagement that changes along the edge", "one engagement for the whole edge")

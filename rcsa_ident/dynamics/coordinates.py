@@ -14,6 +14,14 @@ class Dof(StrEnum):
     `SLOPE_X` is the rotation of the cross-section in the X bending plane, positive as dx/dz with z from the tip
     towards the spindle; a moment in its direction is its work conjugate. `SLOPE_Y` likewise. Of a right-handed turn
     (theta_x, theta_y, theta_z) they are theta_y and -theta_x; `TORSION` is theta_z.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> ri.Dof("x'")
+    <Dof.SLOPE_X: "x'">
+    >>> ri.Dof.SLOPE_X.plane
+    <Dof.X: 'x'>
     """
 
     X = "x"
@@ -38,6 +46,13 @@ class Dof(StrEnum):
 class Coordinate:
     """A named point and a direction, written as engineers do: ``tip.x``.
 
+    Parameters
+    ----------
+    point : str
+    dof : Dof
+
+    Examples
+    --------
     >>> str(Coordinate.parse("flange.x'"))
     "flange.x'"
     """
@@ -47,7 +62,14 @@ class Coordinate:
 
     @classmethod
     def parse(cls, text: str) -> Coordinate:
-        """Read ``point.dof``."""
+        """Read ``point.dof``.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> ri.Coordinate.parse("tip.x")
+        Coordinate(point='tip', dof=<Dof.X: 'x'>)
+        """
         point, _, dof = text.rpartition(".")
         try:
             return cls(point, Dof(dof))

@@ -113,16 +113,43 @@ class ModalModel(Shown):
         return -self.zeta * self.omega_n + 1j * self.omega_n * np.sqrt(1.0 - self.zeta**2)
 
     def receptance(self, omega: FloatArray) -> Receptance:
-        """Return the receptance between all coordinates."""
+        """Return the receptance between all coordinates.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> mode.receptance(ri.hz(800.0, 1000.0, 100.0)).values.shape
+        (3, 1, 1)
+        """
         values = pair_sum(omega, self.pole, np.einsum("mp,mq->mpq", self.phi, self.phi)) + self.residual
         return Receptance(omega, values, self.coordinates, self.coordinates)
 
     def pole_residue(self) -> PoleResidue:
-        """Return the same as poles and residues between all coordinates."""
+        """Return the same as poles and residues between all coordinates.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> import numpy as np
+        >>> modes = ri.normal_modes([ri.hz(900.0), ri.hz(1500.0)], [0.02, 0.03], [[5.0], [4.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> omega = ri.hz(800.0, 1000.0, 100.0)
+        >>> bool(np.allclose(modes.pole_residue().response(omega), modes.receptance(omega).values))
+        True
+        """
         return PoleResidue(self.pole, self.phi.T, self.phi, self.residual)
 
     def to_control(self) -> Any:
-        """Return the model as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates."""
+        """Return the model as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> system = mode.to_control()
+        >>> system.nstates, system.input_labels
+        (2, ['tip_y'])
+        """
         names = [str(each) for each in self.coordinates]
         return self.pole_residue().to_control(names, names)
 

@@ -34,6 +34,14 @@ class PoleResidue(Shown):
     inputs : complex array, shape (m, c)
     constant : array, shape (r, c)
         The direct term; of a receptance the residual compliance of modes beyond the band [m/N].
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> modes = ri.normal_modes([ri.hz(900.0), ri.hz(1500.0)], [0.02, 0.03], [[5.0], [4.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> poles = modes.pole_residue()
+    >>> poles.pole.size, poles.response(ri.hz(800.0, 1000.0, 100.0)).shape
+    (2, (3, 1, 1))
     """
 
     pole: ComplexArray
@@ -117,7 +125,15 @@ class PoleResidue(Shown):
         return StateSpace(a, b, output, self.constant)
 
     def to_control(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Any:
-        """Return the system as python-control's ``StateSpace``, in real modal form; see `StateSpace.to_control`."""
+        """Return the system as python-control's ``StateSpace``, in real modal form; see `StateSpace.to_control`.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> modes = ri.normal_modes([ri.hz(900.0), ri.hz(1500.0)], [0.02, 0.03], [[5.0], [4.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> modes.pole_residue().to_control().nstates
+        4
+        """
         return self.state_space().to_control(inputs, outputs)
 
 

@@ -58,7 +58,16 @@ class Receptance(Drawn):
         return self.values[:, rows[:, None], cols[None, :]]
 
     def between(self, row: str, col: str) -> ComplexArray:
-        """Return one entry, named as ``flange.x``, over frequency, shape (n,)."""
+        """Return one entry, named as ``flange.x``, over frequency, shape (n,).
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> h = mode.receptance(ri.hz(800.0, 1000.0, 100.0))
+        >>> abs(1e6 * h.between("tip.y", "tip.y")).round(2)
+        array([ 3.67, 19.54,  3.27])
+        """
         try:
             i = self.rows.index(Coordinate.parse(row))
             j = self.cols.index(Coordinate.parse(col))
@@ -68,7 +77,16 @@ class Receptance(Drawn):
         return self.values[:, i, j]
 
     def block(self, coordinates: Sequence[Coordinate]) -> Receptance:
-        """Return the receptance between some of its coordinates, which are rows as well as columns."""
+        """Return the receptance between some of its coordinates, which are rows as well as columns.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> tip = machine.tip(tool, ri.hz(500.0, 4000.0, 5.0))
+        >>> print(tip.block([ri.Coordinate("tip", ri.Dof.X)]))
+        tip.x: 701 frequencies, 500 to 4000 Hz
+        """
         rows, cols = ([side.index(c) for c in coordinates] for side in (self.rows, self.cols))
         return Receptance(self.omega, self.values[:, rows][:, :, cols], tuple(coordinates), tuple(coordinates))
 
@@ -111,6 +129,14 @@ class Receptance(Drawn):
         ------
         InputError
             If rows and columns differ, or no fit is within the tolerance.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> modes = ri.normal_modes([ri.hz(900.0), ri.hz(1500.0)], [0.02, 0.03], [[5.0], [4.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> system = modes.receptance(ri.hz(300.0, 3000.0, 5.0)).to_control()
+        >>> system.nstates
+        4
         """
         # late: whoever reads receptances needs no compiled kernels
         from rcsa_ident.dynamics.rational import fitted_poles

@@ -95,6 +95,13 @@ class StateSpace:
         ----------
         inputs, outputs : sequence of str, optional
             Names of the signals; a dot becomes an underscore, since python-control reserves it.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> modes = ri.normal_modes([ri.hz(900.0), ri.hz(1500.0)], [0.02, 0.03], [[5.0], [4.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> modes.pole_residue().state_space().to_control().nstates
+        4
         """
         import control
 

@@ -87,6 +87,17 @@ class IdentifiedMachine(Machine):
         What accelerometers on table or workpiece showed.
     axial : AxialFlange or None
         What an axial tap showed.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+    >>> print(machine)
+    HPM sample machine: X 7 modes, Y 8 modes, 533 to 4266 Hz, converged
+    >>> tip = machine.tip(tool)
+    >>> lobes = ri.stability_lobes(tip, ri.CutSpec().process(tool.cutter, machine.workpiece), ri.rpm(12_000, 16_000, 50), 5e-3)
+    >>> print(lobes.best_speeds()[0])
+    14550 rev/min: stability limit 2.02 mm, recommended 1.61 mm
     """
 
     identified: Mapping[Dof, MachineAxis]

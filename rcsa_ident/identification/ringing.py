@@ -93,6 +93,14 @@ class RungTooling(Shown):
     probability : float [-]
         Of a misfit as large as this or larger, were drawing and spread as told.
     remarks : tuple of str
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> rung = ri.ring("DRAWN.toml", "whole.wav")
+    >>> fluted = [each.assembly.tool[0].diameter for each in (rung.before, rung.after)]
+    >>> [round(1e3 * diameter, 2) for diameter in fluted]
+    [9.6, 9.73]
     """
 
     before: Tooling

@@ -113,7 +113,19 @@ def write_tip_csv(path: str | Path, tip: UncertainReceptance) -> None:
 
 
 def read_tip(path: str | Path) -> Receptance:
-    """Return the tip's receptance of FRF.csv, cross terms included, taken for exact; a direction that is missing is rigid."""
+    """Return the tip's receptance of FRF.csv, cross terms included, taken for exact; a direction that is missing is rigid.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> tip = ri.read_machine("RESULT.json").tip(ri.sample_tooling("S3-PG25-long"))
+    >>> print(ri.read_tip(tip.save("FRF.csv")))
+    tip.x, tip.y: 4167 frequencies, 100 to 4266 Hz
+    """
     frequency, values, further = read_frf_csv(path)
     cross = {}
     for row, col in permutations(AXES, 2):

@@ -72,7 +72,20 @@ def write_forces(path: str | Path, estimate: ForceEstimate) -> None:
 
 
 def read_forces(path: str | Path) -> ForceEstimate:
-    """Return the forces of FORCES.csv; standard deviations that it does not hold are zero."""
+    """Return the forces of FORCES.csv; standard deviations that it does not hold are zero.
+
+    Parameters
+    ----------
+    path : path
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
+    >>> forces = ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15])
+    >>> print(ri.read_forces(forces.save("FORCES.csv")))
+    X 6.62 N rms (± 2.9 N), Y 12.7 N rms (± 3.9 N) over 0.22 s
+    """
     time, force, deviation = read_forces_csv(path)
     step = float(np.mean(np.diff(time))) if time.size > 1 else 0.0
     if step <= 0.0 or np.any(np.abs(np.diff(time) - step) > 1e-3 * step):

@@ -56,6 +56,16 @@ def read_lobes(path: str | Path, max_depth: float | None = None) -> StabilityLob
     -----
     Of the machines that were drawn the file keeps the band alone: its edges take their place, so that a recommended depth is rather
     too small than too large. Where the file recommends no depth, neither does what is read.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+    >>> print(ri.read_lobes(lobes.save("LOBES.csv")))
+    from a file, 8000 to 16000 rev/min; best 13650 rev/min: stability limit 2.48 mm, recommended 1.23 mm
     """
     curves = read_lobes_csv(path)
     limit = np.where(np.isnan(curves.limit), np.inf, curves.limit * 1e-3)

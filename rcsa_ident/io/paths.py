@@ -25,7 +25,7 @@ _FARTHEST = 20.0
 
 
 def read_tool_path(path: str | Path) -> ToolPath:
-    """Return a tool's path: of a program (`read_gcode`), or of a table.
+    r"""Return a tool's path: of a program (`read_gcode`), or of a table.
 
     A table has columns ``x_mm``, ``y_mm``, ``z_mm``; ``i``, ``j``, ``k`` of the tool's axis from the tip into the spindle, by default
     upwards; ``feed_mm_per_min``, ``inf`` for a rapid move, and ``spindle_speed_rpm`` of the move that ends at the row's place, empty where
@@ -35,6 +35,15 @@ def read_tool_path(path: str | Path) -> ToolPath:
     ------
     InputError
         Names the file and the line.
+
+    Examples
+    --------
+    >>> from rcsa_ident.io.paths import read_tool_path
+    >>> from pathlib import Path
+    >>> _ = Path("SLOT.nc").write_text("G21 G90 G0 X0 Y0 Z0\nG1 X60 F1200\nY20\n")
+    >>> path = read_tool_path("SLOT.nc")
+    >>> len(path), round(1e3 * path.length, 1)
+    (3, 80.0)
     """
     kind = Path(path).suffix.lower()
     if kind in PROGRAMS:

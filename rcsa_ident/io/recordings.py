@@ -81,6 +81,13 @@ def read_recording(
     ------
     InputError
         The file is broken, hostile or lacks a channel; nothing is half read.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> sensors = ri.read_campaign("data/sample_runs").sensors
+    >>> print(ri.read_recording("data/sample_runs/recordings/S1-ER32-00_cut.h5", sensors))
+    0.28 s at 25600 Hz: flange_x, flange_y, fixture_x, fixture_y
     """
     if not sensors:
         raise InputError("sensors", "none", "at least one sensor", str(path))

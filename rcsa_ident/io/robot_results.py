@@ -43,10 +43,21 @@ def write_robot_result(path: str | Path, found: RobotIdentification, campaign: s
 def read_robot_result(path: str | Path) -> RobotPosterior:
     """Return what RESULT.json says of a robot after every key, shape and number has been checked.
 
+    Parameters
+    ----------
+    path : path
+
     Raises
     ------
     InputError
         Names the file, the key, what was found and what is allowed.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.read_robot_result("ROBOT.json")
+    >>> print(found.sheet)
+    KUKA KR210: 6 joints, 18 freedoms, 1233 kg
     """
     return robot_posterior_of(read_json(path, "robot"), str(path))
 

@@ -33,10 +33,20 @@ def read_robot(path: str | Path) -> RobotModel:
     Turns are roll, pitch and yaw: about x, then y, then z of the frame before. Moments of inertia are xx, yy, zz, xy, yz, zx of the
     tensor about the centre of mass, in the joint's axes.
 
+    Parameters
+    ----------
+    path : path
+
     Raises
     ------
     InputError
         That names the key, what stands there and what may.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> print(ri.read_robot("data/robots/tx200.toml"))
+    Stäubli TX200: 6 joints, 18 freedoms, 1045 kg
     """
     return robot_of(read_toml(path, "robot"), str(path))
 

@@ -80,6 +80,12 @@ def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
     ------
     InputError
         Names the file, the key, what was found and what is allowed.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> print(ri.read_tooling("data/machines/toolings/S3-PG25-long.toml"))
+    S3-PG25-long: 4 teeth, Ø12 mm, helix 30°, stickout 65.9 mm, insertion 44 mm, holder 100 mm
     """
     data = read_toml(path, "tooling")
     if tip_known and "tool" not in data and "holder" not in data:
@@ -201,6 +207,15 @@ def read_campaign(folder: str | Path) -> Campaign:
     ------
     InputError
         Names the file, the key, what was found and what is allowed.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> campaign = ri.read_campaign("data/sample_runs")
+    >>> print(campaign)
+    HPM sample machine: 80 cuts with S1-ER32, S2-PG25, 8000 to 20000 rev/min, EN AW-6082
+    >>> sorted(campaign.toolings)
+    ['S1-ER32', 'S2-PG25']
     """
     folder = Path(folder)
     path = folder / CAMPAIGN_FILE

@@ -218,6 +218,13 @@ class Machine(TipSource, Drawn):
         omega : array, shape (n,) [rad/s]
         axes : sequence of Dof, default all
             Only these machine axes, and what they feel of others.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> print(machine.receptance(ri.hz(500.0, 4000.0, 5.0)))
+        flange.x, flange.x', flange.y, flange.y': 701 frequencies, 500 to 4000 Hz, with its spread
         """
         return respond_over(self._along(axes), frozen(omega), at_flange)
 
@@ -235,6 +242,13 @@ class Machine(TipSource, Drawn):
         -------
         UncertainReceptance
             Points ``tip`` and ``spindle``; the tool-holder is taken for exactly as it is believed to be.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> print(machine.coupled(tool, ri.hz(500.0, 4000.0, 5.0)))
+        tip.x, tip.x', spindle.x, spindle.x', tip.y, tip.y', spindle.y, spindle.y': 701 frequencies, 500 to 4000 Hz, with its spread
         """
         assembly, omega = self.fitted(tooling).assembly, frozen(omega)
         turning = self.turning
@@ -268,6 +282,16 @@ class Machine(TipSource, Drawn):
         -------
         UncertainReceptance
             Over the directions that the machine knows; over all that were asked for where these are X, Y and more.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> tip = machine.tip(tool, ri.hz(500.0, 4000.0, 5.0))
+        >>> print(tip)
+        tip.x, tip.y: 701 frequencies, 500 to 4000 Hz, with its spread
+        >>> tip.between("tip.x", "tip.x").shape
+        (701,)
         """
         sides = self.sides(self.lines() if omega is None else omega)
         drawing, turning = self.fitted(tooling), self.turning
@@ -290,7 +314,15 @@ class Machine(TipSource, Drawn):
         stiffness_spread: float = STIFFNESS_SPREAD,
         directions: Sequence[Coordinate] = TIP,
     ) -> UncertainReceptance:
-        """Return the receptance between the tip and the workpiece, C11 + G_w: the tip's own where nothing else gives way."""
+        """Return the receptance between the tip and the workpiece, C11 + G_w: the tip's own where nothing else gives way.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> print(machine.relative_tip(tool, ri.hz(500.0, 4000.0, 5.0)))
+        tip.x, tip.y: 701 frequencies, 500 to 4000 Hz, with its spread
+        """
         tip = self.tip(tooling, omega, spread, stiffness_spread, directions)
         if self.workpiece_side is None:
             return tip

@@ -134,6 +134,16 @@ class Listening(Drawn):
     events : tuple of Event
     record : Record or None
         The samples, for the figure.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> path = "data/sample_runs/recordings/S1-ER32-00_cut.h5"
+    >>> heard = ri.listen(path, channels=["flange_x"], quantity="displacement", teeth=4)
+    >>> print(heard.verdict)
+    stable
+    >>> heard.chatter, heard.suggested_speeds
+    ((), ())
     """
 
     verdict: Heard

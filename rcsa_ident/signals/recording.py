@@ -21,7 +21,16 @@ LONGEST = 1 << 20
 
 
 class Quantity(StrEnum):
-    """The physical quantity that a channel measures."""
+    """The physical quantity that a channel measures.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> ri.Quantity("displacement")
+    <Quantity.DISPLACEMENT: 'displacement'>
+    >>> [str(each) for each in ri.Quantity]
+    ['displacement', 'acceleration', 'trigger', 'force', 'sound']
+    """
 
     DISPLACEMENT = "displacement"
     ACCELERATION = "acceleration"
@@ -71,13 +80,13 @@ class Sensor:
         spindle's housing (see `Recording.accelerometer`).
     mount_resonance : float or None [Hz]
         Of the sensor on its mount, a magnet or wax: below it motion is shown too large, by 1 / (1 - (f / resonance)^2).
+    rotation : float [rad]
+        Of the direction that it measures from its axis, about the spindle's, from +X towards +Y.
     gain_spread, cross_talk_spread : float [-]
         Standard deviations of the gain's logarithm, and of the share that a displacement sensor feels of the other axis' motion. They
         count where something of the campaign's drawings is not exact, too.
     delay_spread : float [s]
         Standard deviation of the delay; likewise.
-    rotation : float [rad]
-        Of the direction that it measures from its axis, about the spindle's, from +X towards +Y.
 
     Examples
     --------
@@ -183,7 +192,17 @@ class Recording(Drawn):
         return next(iter(accelerometers(self.sensors, axis, role)), None)
 
     def channel(self, quantity: Quantity, axis: Dof | None = None, part: slice = slice(None)) -> tuple[Sensor, FloatArray] | None:
-        """Return the first channel of this quantity and axis with its samples, or those of a part, or None."""
+        """Return the first channel of this quantity and axis with its samples, or those of a part, or None.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> sensors = ri.read_campaign("data/sample_runs").sensors
+        >>> cut = ri.read_recording("data/sample_runs/recordings/S1-ER32-00_cut.h5", sensors)
+        >>> sensor, gap = cut.channel(ri.Quantity.DISPLACEMENT, ri.Dof.X)
+        >>> sensor.name, gap.shape
+        ('flange_x', (7168,))
+        """
         found = self.sensor(quantity, axis)
         return None if found is None else (found, self.samples[part][:, self.sensors.index(found)])
 

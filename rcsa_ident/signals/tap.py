@@ -85,6 +85,15 @@ class TapFrf(Drawn):
         decays so much faster.
     axis : str
         Machine axis of hammer and response, X or Y.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found = ri.tap("hits.csv", axis="Y")
+    >>> found.used, [hit.reason for hit in found.hits]
+    (2, ['', ''])
+    >>> print(found.save("TIP.uff"))
+    TIP.uff
     """
 
     omega: FloatArray

@@ -65,6 +65,20 @@ def stability_lobes(
     -----
     Drawn machines are asked by the zero-order method, in milliseconds each; of another method's limit they are in the proportion
     that they have to the zero-order limit of the tip itself at the same speed, which the warnings say.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+    >>> print(lobes)
+    zero-order, 8000 to 16000 rev/min, stable below 0.32 mm at any speed; best 13650 rev/min: stability limit 2.48 mm, recommended 1.23 mm
+    >>> for pocket in lobes.best_speeds():
+    ...     print(pocket)
+    13650 rev/min: stability limit 2.48 mm, recommended 1.23 mm
+    9100 rev/min: stability limit 1.66 mm, recommended 0.88 mm
     """
     speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):

@@ -50,6 +50,16 @@ class MultiFrequency:
         band: exact, but for what lies beyond the band. 0 is the zero-order limit.
     watch : callable or None
         Told of each speed once its limit is known.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 2000), 10e-3, ri.MultiFrequency())
+    >>> (1e3 * lobes.limit_depth).round(2).tolist()
+    [0.62, 0.33, 1.25, 0.82, 0.33]
     """
 
     name: ClassVar[str] = MethodName.MULTI_FREQUENCY.value

@@ -32,6 +32,17 @@ class Pocket(Shown):
     recommended_depth : float [m]
         The limit there less what a recommendation holds back; infinite where nothing limits the cut up to that depth, NaN where none is
         recommended.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+    >>> pocket = lobes.best_speeds()[0]
+    >>> print(pocket)
+    13650 rev/min: stability limit 2.48 mm, recommended 1.23 mm
     """
 
     spindle_speed: float
@@ -77,6 +88,18 @@ class StabilityLobes(Drawn):
         Limits of machines and coefficients drawn from what is left open of them.
     withheld : str
         Why no depth is recommended from these limits; empty where one is.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+    >>> round(1e3 * lobes.absolute_limit, 2), lobes.limit_depth.shape
+    (0.32, (161,))
+    >>> print(lobes.save("lobes.csv"))
+    lobes.csv
     """
 
     spindle_speed: FloatArray
@@ -131,6 +154,17 @@ class StabilityLobes(Drawn):
         """Return the depth up to which at least this share of the drawn machines is stable, shape (n,) [m]; 1 is what all have in common.
 
         Without drawn machines it is the nominal limit.
+
+        Examples
+        --------
+        Of what is left open about a machine that was identified:
+
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> process = ri.CutSpec().process(tool.cutter, machine.workpiece)
+        >>> lobes = ri.stability_lobes(machine.tip(tool), process, ri.rpm(14_000, 15_000, 500), 5e-3)
+        >>> bool((lobes.limit_quantile(0.95) < lobes.limit_depth).all())
+        True
         """
         if not 0.0 < probability <= 1.0:
             raise InputError("probability", probability, "above 0 and not above 1")
@@ -146,6 +180,15 @@ class StabilityLobes(Drawn):
         ------
         InputError
             Beyond `max_depth` no limit was looked for.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> process = ri.CutSpec().process(tool.cutter, machine.workpiece)
+        >>> lobes = ri.stability_lobes(machine.tip(tool), process, ri.rpm(14_000, 15_000, 500), 5e-3)
+        >>> lobes.probability(1, 1e-3), lobes.probability(1, 3e-3)
+        (1.0, 0.0)
         """
         if not 0.0 < depth <= self.max_depth:
             raise InputError("depth", depth, f"above 0 and up to {self.max_depth:g} m")
@@ -164,6 +207,16 @@ class StabilityLobes(Drawn):
             That the cut is stable, where machines were drawn.
         reserve : float
             Share of that depth that is kept in reserve.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+        >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+        >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+        >>> round(1e3 * float(lobes.recommended_depth().max()), 2), round(1e3 * float(lobes.limit_depth.max()), 2)
+        (2.0, 2.48)
         """
         if not 0.0 <= reserve < 1.0:
             raise InputError("reserve", reserve, "a share from 0 to below 1")
@@ -185,6 +238,16 @@ class StabilityLobes(Drawn):
             At most so many. The middle of a range that is stable up to `max_depth` stands for it.
         recommended : array, shape (n,) [m], default `recommended_depth`
             At rising speeds.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+        >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+        >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+        >>> print(lobes.best_speeds(count=1)[0])
+        13650 rev/min: stability limit 2.48 mm, recommended 1.23 mm
         """
         lobes = self.ordered()
         recommended = lobes.recommended_depth() if recommended is None else recommended
@@ -200,7 +263,18 @@ class StabilityLobes(Drawn):
         return self.at_places(np.argsort(self.spindle_speed, kind="stable"))
 
     def between(self, low: float, high: float) -> StabilityLobes:
-        """Return the part within a range of speeds [rad/s]."""
+        """Return the part within a range of speeds [rad/s].
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+        >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+        >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 50), max_depth=10e-3)
+        >>> print(lobes.between(ri.rpm(8000), ri.rpm(10_000)).best_speeds()[0])
+        9100 rev/min: stability limit 1.66 mm, recommended 0.88 mm
+        """
         # the last digit of a speed that was written in rev/min is nobody's wish
         inside = (self.spindle_speed >= low * (1.0 - 1e-9)) & (self.spindle_speed <= high * (1.0 + 1e-9))
         return self.at_places(np.flatnonzero(inside))

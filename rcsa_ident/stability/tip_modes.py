@@ -48,6 +48,18 @@ class TipModes(PoleResidue):
     shape : array, shape (k, m) [-], default none
         How each mode moves there, over its motion at the tip; straight lines in between, constant beyond the first and the last.
         Such modes have real directions, and no constant stands beside them.
+
+    Examples
+    --------
+    A mode along Y; X is rigid:
+
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> print(tip)
+    tip: 1 mode at 900 Hz
+    >>> bool(tip.receptance().between("tip.x", "tip.x").any())
+    False
     """
 
     heights: FloatArray | None = None
@@ -84,6 +96,13 @@ class TipModes(PoleResidue):
         ----------
         models : mapping of Dof to ModalModel
             With ``tip.x`` and ``tip.y``, and ``tip.z``; where one of them has the tip's slope, slopes count.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> print(ri.TipModes.of({ri.Dof.Y: mode}))
+        tip: 1 mode at 900 Hz
         """
         told = {coordinate for model in models.values() for coordinate in model.coordinates}
         count = 5 if told & set(DIRECTIONS[3:]) else 3 if DIRECTIONS[2] in told else 2
@@ -124,6 +143,14 @@ class TipModes(PoleResidue):
         ----------
         wide : bool
             From 0.02 times on, and few up to 10 times: where the harmonics of a force still move the tip.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+        >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+        >>> print(tip.receptance())
+        tip.x, tip.y: 476 frequencies, 90 to 1800 Hz
         """
         frequency = np.abs(self.pole)
         waves = np.abs(self.pole.imag) > 0.0

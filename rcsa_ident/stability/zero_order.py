@@ -39,6 +39,16 @@ class ZeroOrder:
     given frequencies trace and determinant of [alpha0] G are interpolated by quintics. Unequal pitch replaces
     1 - e^{-i w tau} by its mean over the teeth [altintas1999] and costs
     speeds times frequencies; limits can be twice as high as the true ones there, so that no depth is recommended from them.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    >>> cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), ri.Engagement.from_immersion(0.5, "down"))
+    >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
+    >>> lobes = ri.stability_lobes(tip, cut, ri.rpm(8000, 16_000, 2000), 10e-3, ri.ZeroOrder())
+    >>> (1e3 * lobes.limit_depth).round(2).tolist()
+    [0.58, 0.32, 1.14, 0.81, 0.32]
     """
 
     name: ClassVar[str] = MethodName.ZERO_ORDER.value

@@ -40,7 +40,14 @@ class Material:
         return self.youngs_modulus / (2.0 * (1.0 + self.poisson))
 
 
-#: Carbide and steel as the project's nominal toolings use them; a tooling file overrides or adds.
+#: Materials as the project's nominal toolings use them; a tooling file overrides or adds.
+#:
+#: Examples
+#: --------
+#: >>> import rcsa_ident as ri
+#: >>> carbide = ri.MATERIALS["carbide"]
+#: >>> carbide.youngs_modulus, carbide.density
+#: (600000000000.0, 14400.0)
 MATERIALS = {
     "carbide": Material(600e9, 14400.0, 0.22, 0.003),
     "steel": Material(205e9, 7850.0, 0.3, 0.003),
@@ -125,6 +132,15 @@ class Contact:
         Moment per angle and length, N m/rad per m.
     translational_damping : float [N s/m^2]
     rotational_damping : float [N s]
+
+    Examples
+    --------
+    A shrink fit, 40 mm of it: its springs side by side are a stiffness in N/m.
+
+    >>> import rcsa_ident as ri
+    >>> contact = ri.Contact(translational_stiffness=2e10, rotational_stiffness=6e5)
+    >>> contact.translational_stiffness * 0.04
+    800000000.0
     """
 
     translational_stiffness: float
@@ -212,6 +228,16 @@ def clamped(
         Length of tool in front of the holder and inside its bore.
     contact : Contact or None
         None is a rigid connection over the insertion.
+
+    Examples
+    --------
+    A shank of carbide in a holder of steel; of its 100 mm only stickout and insertion are there:
+
+    >>> import rcsa_ident as ri
+    >>> shank = ri.BeamSegment(0.1, 0.012, ri.MATERIALS["carbide"])
+    >>> holder = ri.BeamSegment(0.06, 0.05, ri.MATERIALS["steel"], inner_diameter=0.012)
+    >>> print(ri.clamped((shank,), (holder,), stickout=0.05, insertion=0.04, contact=ri.Contact(2e10, 6e5)))
+    stickout 50 mm, insertion 40 mm, holder 60 mm
     """
     wanted = positive("stickout", stickout, "m") + non_negative("insertion", insertion, "m")
     length = sum(s.length for s in tool)

@@ -205,6 +205,14 @@ def tool_holder_receptance(
         The bending plane.
     shear_coefficient : callable
         As in `tool_holder_structure`.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> from rcsa_ident.tool_holder.model import tool_holder_receptance
+    >>> assembly = ri.sample_tooling("S1-ER32").assembly
+    >>> print(tool_holder_receptance(assembly, ri.hz(500.0, 4000.0, 5.0)))
+    tip.x, tip.x', flange.x, flange.x': 701 frequencies, 500 to 4000 Hz
     """
     omega = np.asarray(omega, dtype=float)
     return tool_holder_poles(assembly, float(omega.max()), axis, shear_coefficient).receptance(omega)

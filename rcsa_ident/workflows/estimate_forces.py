@@ -70,6 +70,16 @@ class MonitoredCut(Drawn):
         Standard deviation of a displacement sample, found between the record's lines.
     notes : tuple of str
         What the user should know of recording and machine.
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
+    >>> monitored = ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15])
+    >>> monitored.estimate.force.shape
+    (5631, 2)
+    >>> print(monitored.save("FORCES.csv"))
+    FORCES.csv
     """
 
     estimate: ForceEstimate

@@ -58,6 +58,15 @@ class FlexibleRobot:
         posture : array, shape (j,) [rad]
         turn : float [rad]
             Of the feed from the tool's x, about the tool's axis: the spindle's x is the feed then.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> import numpy as np
+        >>> robot = ri.FlexibleRobot(ri.sample_robot("tx200"))
+        >>> structure = robot.at(np.radians([0.0, 20.0, 100.0, 0.0, 60.0, 0.0]))
+        >>> [str(each) for each in structure.coordinates]
+        ['flange.x', "flange.x'", 'flange.y', "flange.y'", 'flange.z', "flange.z'"]
         """
         chain = posed(self.model, posture, self.tilts)
         tool = chain.flange.then(self.model.tool_point).then(Frame(_about_z(turn)))

@@ -242,6 +242,15 @@ class RobotModel(Shown):
     base_mass : float [kg]
         Of what does not move; it only counts in the robot's weight.
     source : str
+
+    Examples
+    --------
+    >>> import rcsa_ident as ri
+    >>> robot = ri.sample_robot("tx200")
+    >>> print(robot)
+    Stäubli TX200: 6 joints, 18 freedoms, 1045 kg
+    >>> robot.spring_names()[:3]
+    ('J1', 'J1 about x', 'J1 about y')
     """
 
     name: str
@@ -372,7 +381,18 @@ class RobotModel(Shown):
         return frozen(found)
 
     def beyond_limits(self, posture: FloatArray) -> tuple[str, ...]:
-        """Return, in words, which angles of a posture no motor reaches; whole turns count."""
+        """Return, in words, which angles of a posture no motor reaches; whole turns count.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> import numpy as np
+        >>> robot = ri.sample_robot("tx200")
+        >>> robot.beyond_limits(np.radians([0.0, 20.0, 100.0, 0.0, 60.0, 0.0]))
+        ()
+        >>> robot.beyond_limits(np.radians([0.0, 220.0, 100.0, 0.0, 60.0, 0.0]))
+        ('J2 stands at 220.00°, its limits are -115° and 120°',)
+        """
         said = []
         for joint, angle in zip(self.joints, posture, strict=True):
             low, high = joint.limits
