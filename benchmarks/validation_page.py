@@ -16,8 +16,8 @@ Every published figure, closed form and public recording that the package is com
 `python -m benchmarks validation --only NAME` measures the rows whose name or group holds NAME; `--reuse docs/validation.jsonl` measures
 only what is missing there.
 
-- *expected*: as printed, in closed form, as recorded, or as another program computed it from published data. The source says which. Sources in
-  square brackets are those of [references.md](references.md).
+- *expected*: as printed, in closed form, as recorded, or as another program computed it from published data. The source says which. Sources
+  in square brackets are those of [references.md](references.md).
 - *error*: the largest of all values of the row; of each value itself unless another measure stands behind it. Rows of more than eight
   values show the one that is farthest off.
 - *allowed*: what the test in the last column holds; `tests/benchmarks/test_validation.py` holds it of every row that stands here.
@@ -27,9 +27,9 @@ only what is missing there.
 """
 FILES = """The files are other people's and are not part of the project: each row names the file and where it is public.
 """
-STUDY = """Virtual machines whose truth is known, drawn from seeds that were fixed before the methods were tuned ([study.md](study.md)). Nothing is
-run again for this page: the rows are read from what the study left, the commit is that of the file's last change.
-Expected are the aims that were set; the 90 % band should hold 85 to 95 % of the truth.
+STUDY = """Virtual machines whose truth is known, drawn from seeds that were fixed before the methods were tuned
+([study.md](study.md)). Nothing is run again for this page: the rows are read from what the study left, the commit is that of the
+file's last change. Expected are the aims that were set; the 90 % band should hold 85 to 95 % of the truth.
 """
 NOTES = {"Files that others recorded": FILES, "The study: virtual machines": STUDY}
 

@@ -16,7 +16,7 @@ from tests.fixtures.paths import ROOT
 
 PAGE = DOCS / "validation.md"
 ROWS = {row["name"]: row for row in read_rows(PAGE.with_suffix(".jsonl"))}
-ALL = dict((case.name, (group, case)) for group, case in cases())
+ALL = {case.name: (group, case) for group, case in cases()}
 
 
 def test_the_page_is_what_its_rows_give():
