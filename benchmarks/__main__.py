@@ -62,6 +62,7 @@ STUDIES = (
     "corner_radius",
     "robot_cuts",
     "robot_milling",
+    "compile",
 )
 
 
