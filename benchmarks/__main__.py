@@ -69,6 +69,7 @@ STUDIES = (
     "fuzz",
     "mutation",
     "physics_pictures",
+    "compile",
 )
 
 
