@@ -89,7 +89,7 @@ def _sow(folder: Path, name: str) -> None:
     if not seeds.is_dir():
         seeds.mkdir(parents=True)
         corpus.mkdir(parents=True, exist_ok=True)
-        for raw in TARGETS[name].seeds(seeds.parent):
+        for raw in TARGETS[name].sown(seeds.parent):
             for place in (seeds, corpus):
                 (place / sha256(raw).hexdigest()[:16]).write_bytes(raw)
 
@@ -253,7 +253,7 @@ def _replay(target: Target, raw: bytes) -> None:
     """Feed one file to a reader, and print what became of it."""
     folder = Path("/dev/shm" if os.path.isdir("/dev/shm") else ".") / f"fuzz-{os.getpid()}"
     folder.mkdir()
-    for seed in target.seeds(folder):
+    for seed in target.sown(folder):
         try:
             target.read(seed, folder)
         except refusals():

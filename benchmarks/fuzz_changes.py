@@ -1,7 +1,7 @@
 """Changes to what a fuzzer feeds: bytes anywhere, words of a text, and values of TOML and JSON, so that their syntax stays whole.
 
-Most changed bytes of a settings file are a syntax error, which a parser refuses that others have fuzzed. What this package reads lies behind
-it: keys, types, ranges, and what they mean together.
+Most changed bytes of a settings file are a syntax error, which a parser refuses that others have fuzzed. What this package reads lies
+behind it: keys, types, ranges, and what they mean together.
 """
 
 from __future__ import annotations

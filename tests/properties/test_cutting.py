@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -84,7 +85,7 @@ def test_a_move_may_be_told_in_pieces(start, end, shares):
     for path in (np.array([first, last]), pieces):
         field = DexelField.block(np.zeros(3), BLOCK, 1e-3)
         before = field.volume
-        for move in zip(path[:-1], path[1:], strict=True):
+        for move in pairwise(path):
             Sweep(field, SOLID, ToolPath(np.array(move))).run()
         volumes.append((before, field.volume))
     (before, whole), (_, pieced) = volumes
