@@ -14,7 +14,7 @@ for axis, modes in MODES.items():
     for size in (210.0, 265.0, 240.0):  # three hits, N
         pulse = size * np.sin(np.pi * np.clip((time - 0.05) / 4e-4, 0.0, 1.0))  # 0.4 ms
         spectrum = np.fft.rfft(pulse)
-        receptance = sum(w**2 / k / (w**2 + 2 * z * w * frequency + frequency**2) for w, z, k in ((2 * np.pi * f, z, k) for f, z, k in modes))
+        receptance = sum(1 / k / (1 + 2 * z * s + s**2) for s, z, k in ((frequency / (2 * np.pi * f), z, k) for f, z, k in modes))
         force.append(pulse + 0.05 * chance.standard_normal(samples))
         acceleration.append(np.fft.irfft(spectrum * receptance * frequency**2, samples) + 0.3 * chance.standard_normal(samples))
     table = np.column_stack([np.arange(3 * samples) / RATE, np.concatenate(force), np.concatenate(acceleration)])
