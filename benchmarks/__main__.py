@@ -63,6 +63,7 @@ STUDIES = (
     "robot_cuts",
     "robot_milling",
     "fuzz",
+    "fuzz_api",
     "mutation",
 )
 
