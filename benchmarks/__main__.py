@@ -67,6 +67,7 @@ STUDIES = (
     "formats",
     "format_examples",
     "fuzz",
+    "fuzz_api",
     "mutation",
     "physics_pictures",
     "compile",

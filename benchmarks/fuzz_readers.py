@@ -127,8 +127,11 @@ def _tapped(raw: bytes, folder: Path) -> None:
 
     path = folder / "given.csv"
     path.write_bytes(raw)
-    asked = dict.fromkeys(("force", "response", "quantity", "axis", "rate_hz"))
-    tap(asked | {"estimator": "h1", "sensor_mass_g": 0.0, "file": ""}, Upload(path, "given.csv", folder / "made"))
+    asked = dict.fromkeys(("force", "response", "rate_hz"))
+    tap(
+        asked | {"quantity": "acceleration", "axis": "X", "estimator": "h1", "sensor_mass_g": 0.0, "file": ""},
+        Upload(path, "given.csv", folder / "made"),
+    )
 
 
 # settings in TOML

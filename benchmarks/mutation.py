@@ -82,11 +82,12 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--most", type=int, default=80)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--line", type=int)
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="after which no further mutant is tried, each module")
     given = parser.parse_args(arguments)
     os.environ["NUMBA_DISABLE_JIT"] = "1"
     for module in given.modules:
         tests = given.tests.split(",") if given.tests else [own_tests(module)]
-        print(_line(module, *score(module, tests, given.most, given.seed, given.line)), flush=True)
+        print(_line(module, *score(module, tests, given.most, given.seed, given.line, given.seconds)), flush=True)
 
 
 def own_tests(module: str) -> str:
@@ -101,7 +102,9 @@ def _line(module: str, killed: int, survivors: int, equivalent: int, seconds: fl
     return f"| {module} | {killed} of {counted} | {share:.0f} % | {equivalent} | {seconds / 60.0:.1f} min |"
 
 
-def score(module: str, tests: list[str], most: int, seed: int, line: int | None = None) -> tuple[int, int, int, float]:
+def score(
+    module: str, tests: list[str], most: int, seed: int, line: int | None = None, seconds: float = float("inf")
+) -> tuple[int, int, int, float]:
     """Return how many mutants were noticed, how many were not, how many of these change nothing, and the time all took [s].
 
     Parameters
@@ -115,16 +118,19 @@ def score(module: str, tests: list[str], most: int, seed: int, line: int | None 
     seed : int
     line : int or None
         Of the mutants that are tried, where not all are meant.
+    seconds : float
+        After which no further one is tried.
     """
     source = (ROOT / module).read_text(encoding="utf-8")
     found = [mutant for mutant in mutants(source) if line is None or mutant.line == line]
-    chosen = sorted(random.Random(seed).sample(found, min(most, len(found))), key=lambda mutant: mutant.line)
-    trial = _Trial(module, chosen)
+    trial = _Trial(module, random.Random(seed).sample(found, min(most, len(found))), seconds)
     import pytest
 
     begun = time.perf_counter()
     with contextlib.redirect_stdout(io.StringIO()):
         pytest.main(["-q", "-x", "-p", "no:cacheprovider", *tests], plugins=[trial])
+    if not trial.sound:
+        raise SystemExit(f"{', '.join(tests)}: they fail though nothing has changed, or hold no test")
     return trial.killed, trial.survivors, trial.same, time.perf_counter() - begun
 
 
@@ -135,21 +141,28 @@ class _Trial:
     ----------
     module : str
     chosen : list of Mutant
+    seconds : float
+        After which no further one is tried.
     """
 
-    def __init__(self, module: str, chosen: list[Mutant]) -> None:
-        self.module, self.chosen = module, chosen
+    def __init__(self, module: str, chosen: list[Mutant], seconds: float) -> None:
+        self.module, self.chosen, self.end = module, chosen, time.perf_counter() + seconds
         self.killed = self.survivors = self.same = 0
+        #: Whether there are tests, and they pass while nothing has changed.
+        self.sound = False
 
     def pytest_runtestloop(self, session: Any) -> bool:
         """Run the tests as they are, and then with each mutant."""
         imported = importlib.import_module(".".join(Path(self.module).with_suffix("").parts))
         begun = os.times().children_user
         if not session.items or _forked(lambda: _failed(session), 600.0):
-            raise SystemExit(f"the tests of {self.module} fail though nothing has changed, or there are none")
+            return True
+        self.sound = True
         limit = max(_TIMES * (os.times().children_user - begun), _LEAST)
         known = {(each["module"], each["before"], each["after"]) for each in equivalent()}
         for mutant in self.chosen:
+            if time.perf_counter() > self.end:
+                break
             if (self.module, mutant.before, mutant.after) in known:
                 self.same += 1
             elif _forked(partial(_mutated, imported, mutant, session), limit):
