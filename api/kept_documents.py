@@ -9,7 +9,8 @@ from fastapi import Request, Response
 from api.conventions import expected, found_or_404, tagged, unchanged, utf8
 from api.problems import Problem
 from api.schemas.common import Answer, Body, body_of
-from api.stores.entities import Document, Documents, Note, Stale
+from api.stores.changes import Note
+from api.stores.entities import Document, Documents, Stale
 from rcsa_ident.io.toml_text import toml_of
 
 TOML, JSON = "application/toml", "application/json"

@@ -55,6 +55,8 @@ STUDIES = (
     "hammer",
     "rough",
     "rough_recommendation",
+    "validation",
+    "all",
     "labelled_cuts",
     "learn",
     "ring",
@@ -62,6 +64,13 @@ STUDIES = (
     "corner_radius",
     "robot_cuts",
     "robot_milling",
+    "formats",
+    "format_examples",
+    "fuzz",
+    "fuzz_api",
+    "mutation",
+    "physics_pictures",
+    "compile",
 )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import best_of, row
+from benchmarks.timing import Race
 from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
 from rcsa_ident.identification._kernels import modal_cross_frf
 from rcsa_ident.identification.genetic_algorithm import modal_fractions
@@ -17,6 +17,11 @@ LINES, TOOLINGS, MODES = 164, 2, 10
 
 def run() -> list[dict[str, Any]]:
     """2 toolings x 164 frequencies of their own x 10 modes."""
+    return [race.row() for race in races()]
+
+
+def races() -> list[Race]:
+    """Complex modes; passive form with one output and with two."""
     rng = np.random.default_rng(1)
     n = LINES * TOOLINGS
     omega = 2.0 * np.pi * rng.uniform(500.0, 4300.0, n)
@@ -51,11 +56,10 @@ def run() -> list[dict[str, Any]]:
     kernel()
     reference = vectorised()
     error = float(np.max(np.abs(out[0] + 1j * out[1] - reference)) / np.max(np.abs(reference)))
-    rows = [
-        row("candidate, complex modes (2 x 164 lines x 10 modes)", best_of(kernel) * 1e6, best_of(vectorised) * 1e6, "us", f"{error:.0e}")
-    ]
-
-    return [*rows, *(passive(rng, omega, omega_n, flange, tip, joint, outputs) for outputs in (1, 2))]
+    first = Race(
+        "candidate, complex modes (2 x 164 lines x 10 modes)", "NumPy, vectorised", "numpy", kernel, vectorised, f"{error:.0e} apart"
+    )
+    return [first, *(passive(rng, omega, omega_n, flange, tip, joint, outputs) for outputs in (1, 2))]
 
 
 def passive(
@@ -66,7 +70,7 @@ def passive(
     tip: np.ndarray,
     joint: np.ndarray,
     outputs: int,
-) -> dict[str, Any]:
+) -> Race:
     """The polish's kernel with all derivatives; with two outputs gap and fixture, and the stiffness changes with speed."""
     n, m, pairs = omega.size, MODES, MODES * (MODES + 1) // 2
     psi = rng.standard_normal((m, 3)) * 0.2
@@ -109,4 +113,4 @@ def passive(
     error = float(np.max(np.abs(kernel() - reference)) / np.max(np.abs(reference)))
     what = "flange" if outputs == 1 else "gap and fixture, stiffness over speed"
     name = f"candidate, passive form, {what}, with all {columns} derivatives (NumPy: values only)"
-    return row(name, best_of(kernel) * 1e6, best_of(vectorised) * 1e6, "us", f"{error:.0e}")
+    return Race(name, "NumPy, vectorised", "numpy", kernel, vectorised, f"{error:.0e} apart")

@@ -40,14 +40,17 @@ BEFORE = [
     "python-multipart",
     "websockets",
 ]
+#: Requirements that only `rcsa-ident-serve` has, fastapi and pydantic with what they need left out: these two are asked for.
+SERVICE = {"pydantic-settings", "uvicorn", "sqlalchemy", "alembic", "prometheus-client", "dbos", "multipart", "websockets"}
 _HEAD = """# What the package rests on
 
 Written by `python -m benchmarks dependencies --out docs/dependencies.md`, from what is installed. "Brings" counts the packages that a
-requirement needs, itself left out; many share them. Newest
+requirement needs, itself left out; many share them. "Alone" is what an installation without the requirement would lack: what no other one
+needs. Newest
 releases are those of the table that `--releases` names; a dash where it has none, or one older than what is installed.
 
-| requirement | installed | licence | MB | brings | with them, MB | newest release |
-|---|---|---|---|---|---|---|
+| requirement | installed | licence | MB | brings | with them, MB | alone, MB | newest release |
+|---|---|---|---|---|---|---|---|
 """
 
 
@@ -67,12 +70,15 @@ def main(arguments: list[str]) -> None:
 def table(releases: dict[str, str]) -> str:
     """Return the page, with the newest release of those packages that it is told of."""
     names = required()
-    rows = [_row(name, releases.get(name, "0")) for name in names]
+    alone = {name: _size(needed(names).values()) - _size(needed(each for each in names if each != name).values()) for name in names}
+    rows = [_row(name, alone[name], releases.get(name, "0")) for name in names]
     now, before = needed(names), needed(name for name in BEFORE if _installed(name))
     ends = [
         f"\nThe base install: {len(now)} packages, {_size(now.values()):.0f} MB; what was required before comes to {len(before)} packages, "
         f"{_size(before.values()):.0f} MB, in the versions of now.",
         "What came: " + ", ".join(sorted(set(now) - set(before))) + ".",
+        "The largest packages [MB]: " + ", ".join(f"{_size([each]):.0f} {each.name}" for each in _largest(now.values(), 10)) + ".",
+        f"What nothing but the service needs: {_size(now.values()) - _size(needed(set(names) - SERVICE).values()):.0f} MB.",
     ]
     return _HEAD + "\n".join([*rows, *ends]) + "\n"
 
@@ -97,9 +103,13 @@ def needed(names: Iterable[str]) -> dict[str, Distribution]:
     return found
 
 
-def _row(name: str, release: str) -> str:
+def _largest(packages: Iterable[Distribution], count: int) -> list[Distribution]:
+    return sorted(packages, key=lambda each: -_size([each]))[:count]
+
+
+def _row(name: str, alone: float, release: str) -> str:
     own, whole = distribution(name), needed([name])
-    sizes = f"{_size([own]):.1f} | {len(whole) - 1} | {_size(whole.values()):.0f}"
+    sizes = f"{_size([own]):.1f} | {len(whole) - 1} | {_size(whole.values()):.0f} | {alone:.1f}"
     # a list may be older than what is installed
     newest = release if Version(release.partition(",")[0]) >= Version(own.version) else "–"
     return f"| {name} | {own.version} | {_licence(own)} | {sizes} | {newest} |"

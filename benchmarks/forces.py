@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import best_of, row
+from benchmarks.timing import Race, best_of, row
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -24,6 +25,11 @@ CUT = CuttingConditions(840.0, 0.4e-3, 1e-4, Engagement.from_immersion(0.5, "dow
 
 def run() -> list[dict[str, Any]]:
     """Force lines per coefficient with and without run-out, unequal pitch and many orders, with all slopes, of a corner radius."""
+    return [*(race.row() for race in races()), _rounded()]
+
+
+def races() -> list[Race]:
+    """All that has closed forms."""
     unequal = Cutter(4, 0.012, np.radians(30.0), pitch=np.radians([84.0, 96.0, 84.0, 96.0]))
     return [
         _lines("8 orders", _cylinder(False), ORDERS),
@@ -32,8 +38,17 @@ def run() -> list[dict[str, Any]]:
         _lines("64 orders", _cylinder(False), MANY),
         _lines("64 orders, unequal pitch", unequal, MANY),
         _slopes(),
-        _rounded(),
     ]
+
+
+def cylinder_lines(runout: bool) -> np.ndarray:
+    """Lines of a cylinder at eight orders as sums over rows, per unit of K_tc, K_rc, K_te and K_re."""
+    return np.asarray(unit_lines(_cylinder(runout), CUT, ORDERS, runout=runout)[..., :4])
+
+
+def closed_lines(runout: bool) -> np.ndarray:
+    """The same by the closed forms."""
+    return _closed(_cylinder(runout), ORDERS, runout)
 
 
 def _cylinder(runout: bool) -> Cutter:
@@ -53,14 +68,20 @@ def _closed(cutter: Cutter, orders: np.ndarray, runout: bool) -> np.ndarray:
     return np.asarray(cylinder_forces.true_unit_lines(cutter.pitch, *_told(cutter, orders)))
 
 
-def _lines(name: str, cutter: Cutter, orders: np.ndarray, runout: bool = False) -> dict[str, Any]:
+def _lines(name: str, cutter: Cutter, orders: np.ndarray, runout: bool = False) -> Race:
     ours, peer = unit_lines(cutter, CUT, orders, runout=runout), _closed(cutter, orders, runout)
     error = float(np.max(np.abs(ours[..., :4] - peer) / np.abs(peer).max(axis=(0, 1))))
-    times = best_of(lambda: unit_lines(cutter, CUT, orders, runout=runout)), best_of(lambda: _closed(cutter, orders, runout))
-    return row(f"lines of a cylinder per coefficient: {name}", *(1e6 * each for each in times), "us", f"{error:.0e}")
+    return Race(
+        f"lines of a cylinder per coefficient: {name}",
+        "closed forms along the helix, NumPy",
+        "numpy",
+        partial(unit_lines, cutter, CUT, orders, runout=runout),
+        partial(_closed, cutter, orders, runout),
+        f"{error:.0e}",
+    )
 
 
-def _slopes() -> dict[str, Any]:
+def _slopes() -> Race:
     """The peer asks its closed forms for each coefficient by itself and for run-out, as it was done."""
     cutter, eccentric = _cylinder(False), _cylinder(True)
 
@@ -69,8 +90,8 @@ def _slopes() -> dict[str, Any]:
             _closed(cutter, ORDERS, False)
         _closed(eccentric, ORDERS, True)
 
-    times = best_of(lambda: force_and_slope(cutter, CUT, COEFFICIENTS, ORDERS)), best_of(before)
-    return row("lines of a cylinder with their slopes", *(1e6 * each for each in times), "us", "")
+    ours = partial(force_and_slope, cutter, CUT, COEFFICIENTS, ORDERS)
+    return Race("lines of a cylinder with their slopes", "closed forms along the helix, NumPy", "numpy", ours, before, "the same lines")
 
 
 def _rounded() -> dict[str, Any]:

@@ -11,36 +11,20 @@ from __future__ import annotations
 
 import argparse
 import io
-import os
 import tempfile
 import zipfile
 from collections.abc import Iterator
-from http.client import HTTPConnection, HTTPException
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from api.schemas.campaigns import EXAMPLE
 from api.schemas.toolings import EXAMPLE as TOOLING
-from benchmarks.service import ask, machine_text, others, serving, use
+from benchmarks.request_cost import Cost, cost_of
+from benchmarks.service import ask, machine_text, serving
 
 #: Just below the limit of a body.
 LARGEST = 15_900_000
 _FORM = "multipart/form-data"
-
-
-class Cost(NamedTuple):
-    """What a request has cost.
-
-    Core time of the service's own process and of its others [s], memory that the first took more at its peak and all that one of the others
-    had at most [MB], and the answer.
-    """
-
-    seconds: float
-    elsewhere: float
-    megabytes: float
-    largest: float
-    words: str
-    status: int
 
 
 def main(arguments: list[str]) -> None:
@@ -151,43 +135,3 @@ def _archive() -> bytes:
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("tools.json", b" " * 2_000_000_000)
     return sink.getvalue()
-
-
-def cost_of(port: int, process: int, words: str, method: str, path: str, headers: dict[str, str], body: bytes) -> Cost:
-    """Return what a request costs until its answer is read."""
-    own, before = _seconds(process), use(process)
-    resting = _peak(process, anew=True)
-    for id in others(process):
-        _peak(id, anew=True)
-    connection = HTTPConnection("127.0.0.1", port, timeout=300)
-    status = 0
-    try:
-        connection.request(method, path, body or None, headers)
-        answer = connection.getresponse()
-        status = answer.status
-        answer.read()
-    except (OSError, HTTPException):
-        # closed before the whole request was sent
-        pass
-    finally:
-        connection.close()
-    spent, total = _seconds(process) - own, use(process)[0] - before[0]
-    largest = max((_peak(id) for id in others(process)), default=0.0)
-    return Cost(spent, max(total - spent, 0.0), _peak(process) - resting, largest, words, status)
-
-
-def _seconds(process: int) -> float:
-    fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def _peak(process: int, anew: bool = False) -> float:
-    """Most memory that the process has had since the peak was set to what it has now [MB]."""
-    try:
-        if anew:
-            Path(f"/proc/{process}/clear_refs").write_text("5", encoding="utf-8")
-        lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        # it has ended
-        return 0.0
-    return next((int(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0) / 1e3

@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp
 
+from benchmarks.label_scores import ORDERS, POOL, SOFTENING, Score
+from benchmarks.labelled_cuts_page import Findings, write_page
 from benchmarks.real_files import DOWN, FILES
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -44,15 +46,13 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "labelled_cuts.md"
 MODES = {Dof.X: (782.7, 0.0184, 6.5616e6), Dof.Y: (752.8, 0.0186, 4.8852e6)}
 SPREADS = (80.0, 0.008, 2e6)
 COEFFICIENTS, COEFFICIENT_SPREADS = (10.95e8, 1.76e8), (1.5e8, 0.5e8)
-#: Draws of the prior, without softening and with it, of the seed with which the first trial was made; labels; random orders.
-POOL, SOFT_POOL, SEED, LABELS, ORDERS = 6000, 2000, 11, (0, 5, 10, 20, 40), 10
+#: Draws of the prior with softening, the seed with which the first trial was made, labels.
+SOFT_POOL, SEED, LABELS = 2000, 11, (0, 5, 10, 20, 40)
 #: Draws that stand for a posterior.
 KEPT = 400
 #: What is chosen among on the 40: deviation and length of the discrepancy, width of the boundary; the share of wrong labels is fixed.
 GRID = ((0.15, 0.25, 0.35, 0.5), (0.1, 0.2, 0.3, 0.5), (0.1, 0.15, 0.2, 0.3, 0.4))
 WRONG = 0.02
-#: Standard deviation of the stiffness that 1000 rev/min take away or add.
-SOFTENING = 0.01 / from_rpm(1000.0)
 
 
 def read(path: Path) -> TestedCuts:
@@ -144,47 +144,6 @@ class Pool:
         return model.noise.stable(drawn[:, place] - np.log(cuts.axial_depth))
 
 
-@dataclass(frozen=True, slots=True)
-class Score:
-    """How well probabilities told labels.
-
-    Parameters
-    ----------
-    right, cuts : float
-    log_score : float
-        Mean logarithm of the probability of what was seen.
-    expected : float
-        Accuracy that the probabilities themselves expect.
-    """
-
-    right: float
-    cuts: int
-    log_score: float
-    expected: float
-
-    @classmethod
-    def of(cls, probability: FloatArray, cuts: TestedCuts) -> Score:
-        """Score probabilities that cuts are stable."""
-        stable = cuts.seen(Verdict.STABLE)
-        seen = np.where(stable, probability, 1.0 - probability)
-        return cls(
-            int(np.sum((probability > 0.5) == stable)),
-            stable.size,
-            float(np.mean(np.log(seen))),
-            float(np.mean(np.maximum(probability, 1.0 - probability))),
-        )
-
-    @classmethod
-    def mean(cls, scores: Sequence[Score]) -> Score:
-        """Mean of several, over as many cuts each."""
-        right, log_score, expected = np.mean([(s.right, s.log_score, s.expected) for s in scores], axis=0).tolist()
-        return cls(right, scores[0].cuts, log_score, expected)
-
-    def __str__(self) -> str:
-        share, expected = 100.0 * self.right / self.cuts, 100.0 * self.expected
-        return f"{self.right:.4g} of {self.cuts} ({share:.1f} %), log score {self.log_score:.3f}, expected {expected:.1f} %"
-
-
 def chosen_on(pool: Pool, training: TestedCuts) -> list[tuple[float, float, float, float]]:
     """(log score, deviation, length, width), the best first: each speed of the 40 told from the others, no other cut looked at."""
     speeds, place = np.unique(training.spindle_speed, return_inverse=True)
@@ -267,8 +226,6 @@ def main(arguments: Sequence[str]) -> None:
         for score, deviation, length, width in chosen_on(pool, training)[:12]:
             print(f"log score {score:.3f}: deviation {deviation:g}, length {length:g}, width {width:g}")
         return
-    from benchmarks.labelled_cuts_page import Findings, write_page
-
     aside, start = unseen(cuts, training), time.process_time()
     found = pool.learnt(training, model, effort=Effort())
     seconds = time.process_time() - start

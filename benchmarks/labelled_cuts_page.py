@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.labelled_cuts import ORDERS, POOL, SOFTENING, Score
+from benchmarks.label_scores import ORDERS, POOL, SOFTENING, Score
 from rcsa_ident.stability.label_posterior import LabelModel
 from rcsa_ident.units import from_rpm
 

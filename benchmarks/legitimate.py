@@ -27,7 +27,7 @@ from api.schemas.robots import EXAMPLE
 from api.schemas.toolings import MOST_SEGMENTS
 from api.work.robots import MOST_JOINTS, MOST_PLACES
 from api.work.tasks import MOST_LINES
-from benchmarks.hostile import Cost, cost_of
+from benchmarks.request_cost import Cost, cost_of
 from benchmarks.service import ask, machine_text, new_tooling, serving
 from benchmarks.uploads import SAMPLES, campaign_of, recording
 from rcsa_ident.io.setups import tooling_of
@@ -39,6 +39,8 @@ _JSON = {"Content-Type": "application/json"}
 _TUS = {"Tus-Resumable": "1.0.0"}
 _FORM = {"Content-Type": "multipart/form-data; boundary=x"}
 _PAGE = 200
+#: Of the stock of paths [mm].
+_BLOCK = [0.0, 0.0, -20.0, 200.0, 200.0, 0.0]
 #: Routes that cost less are counted alone [s].
 SLIGHT = 0.05
 _LISTS = ("machines", "toolings", "robots", "changes", "recordings", "campaigns", "identifications", "keys")
@@ -62,14 +64,15 @@ class Ask(NamedTuple):
 class Shop(NamedTuple):
     """What the service holds.
 
-    Ids of a machine, a campaign of 160 recordings, jobs of an identification and of lobes, a key, a campaign of large recordings, and one,
-    and a campaign of a tooling that is new to the machine.
+    Ids of a machine, a campaign of 160 recordings, jobs of an identification, of lobes and of a path, a key, a campaign of large
+    recordings, and one, and a campaign of a tooling that is new to the machine.
     """
 
     machine: str
     campaign: str
     job: str
     lobes: str
+    path: str
     key: str
     large: str
     raw: bytes
@@ -141,9 +144,21 @@ def _shop(port: int, folder: Path) -> Shop:
             pass
         if told.answer is None:
             raise RuntimeError(told.job.problem)
+        path = _cut_path(client, folder)
         key = client.send("POST", "/keys", json={"scopes": ["read"]}).json()["id"]
         new = _new_tool(client, machine)
-    return Shop(machine, campaign, job, lobes, key, large, raw, new)
+    return Shop(machine, campaign, job, lobes, path, key, large, raw, new)
+
+
+def _cut_path(client: Client, folder: Path) -> str:
+    """A job of a path that is done."""
+    (folder / "PATH.nc").write_bytes(_zigzag(5000))
+    job = client.cut_path("removal", folder / "PATH.nc", new_tooling(0), block_mm=_BLOCK, cell_mm=0.5).id
+    while (told := client.path_job(job, wait=20)).job.finished is None:
+        pass
+    if told.answer is None:
+        raise RuntimeError(told.job.problem)
+    return job
 
 
 def _new_tool(client: Client, machine: str) -> str:
@@ -186,7 +201,7 @@ def _ladders(method: str, path: str, shop: Shop) -> Iterator[Iterator[Ask]]:
     if asked is not None:
         yield from asked
         return
-    ids = {"/machines/": shop.machine, "/identifications/": shop.job, "/lobes/": shop.lobes, "/keys/": shop.key}
+    ids = {"/machines/": shop.machine, "/identifications/": shop.job, "/lobes/": shop.lobes, "/paths/": shop.path, "/keys/": shop.key}
     id = next((found for part, found in ids.items() if part in path), shop.campaign)
     place = path.replace("{id}", id).replace("{version}", "1")
     place = place.replace("{name}", "tooling" if "/schemas/" in path else "T0" if "/toolings/" in path or "/robots/" in path else CUT)
@@ -307,6 +322,7 @@ def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
         "POST /lobes": several("/v1/lobes", 320),
         "POST /advice": several("/v1/advice", 160),
         **_of_robots(),
+        **_of_paths(shop.machine),
     }
 
 
@@ -339,6 +355,34 @@ def _of_robots() -> dict[str, list[Iterator[Ask]]]:
             iter([Ask(f"{MOST_PLACES} places", "/v1/robots/path/preview", {"Content-Type": "text/csv"}, csv.encode())])
         ],
     }
+
+
+def _of_paths(machine: str) -> dict[str, list[Iterator[Ask]]]:
+    """Questions of a tool along a path: as many lines of a program as are taken."""
+    tooling = {"tooling": new_tooling(0), "block_mm": _BLOCK}
+    judged = tooling | {"machine": machine, "spindle_speed_rpm": 12_000.0}
+
+    def queried(name: str, keys: dict[str, Any]) -> list[Iterator[Ask]]:
+        head = b'--x\r\nContent-Disposition: form-data; name="query"\r\n\r\n' + json.dumps(keys).encode()
+        head += b'\r\n--x\r\nContent-Disposition: form-data; name="path"; filename="PATH.nc"\r\n\r\n'
+        return [
+            _halved("{} lines of a program", 200_000, lambda count: (f"/v1/paths/{name}", head + _zigzag(count) + b"\r\n--x--\r\n"), _FORM)
+        ]
+
+    return {
+        "POST /paths/preview": [
+            _halved("{} lines of a program", 200_000, lambda count: ("/v1/paths/preview", _zigzag(count)), {"Content-Type": "text/x-gcode"})
+        ],
+        "POST /paths/removal": queried("removal", tooling),
+        "POST /paths/stability": queried("stability", judged),
+        "POST /paths/milling": queried("milling", judged),
+    }
+
+
+def _zigzag(count: int) -> bytes:
+    """A program of so many lines over the block."""
+    places = (f"X{200.0 * (k % 2):g}Y{200.0 * k / count:.3f}" if k % 20 == 0 else f"X{(7.3 * k) % 200.0:.2f}" for k in range(count))
+    return ("G21G90G0X-20Y0Z-1\nF2000\nG1\n" + "\n".join(places)).encode()
 
 
 def _sound() -> bytes:

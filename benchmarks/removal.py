@@ -9,13 +9,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import manifold3d
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.timing import row
+from benchmarks.timing import Race, row
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
@@ -28,6 +28,8 @@ from rcsa_ident.toolpath.solid import ToolSolid
 RADIUS, CELL, HIGH = 0.005, 0.25e-3, np.array([0.06, 0.03, 0.012])
 FLAT = ToolSolid.of(Cutter(2, 2.0 * RADIUS), 0.04)
 BALL = ToolSolid.of(Cutter(2, 2.0 * RADIUS, profile=Profile.ball(2.0 * RADIUS)), 0.04)
+#: Of the cuts whose volumes are compared [m].
+DEPTH = 3.3e-3
 #: How far apart places on a path are [m].
 STEP = 1e-4
 
@@ -61,42 +63,63 @@ def boolean(tool: Any, path: ToolPath) -> float:
     return float(np.prod(HIGH) - stock.volume())
 
 
-def volumes() -> list[dict[str, Any]]:
-    """Errors of volumes, mean and largest of nine lays of the lattice [%]."""
-    depth = 3.3e-3
-    z = HIGH[2] - depth
-    across = RADIUS**2 * np.arccos(1.0 - depth / RADIUS) - (RADIUS - depth) * np.sqrt(2.0 * RADIUS * depth - depth**2)
+class Cut(NamedTuple):
+    """What is taken out: places about the middle, axes, the closed form of the shift across where there is one."""
+
+    solid: ToolSolid
+    places: FloatArray
+    axes: FloatArray | None = None
+    form: Callable[[float], float] | None = None
+
+    def exact(self, path: ToolPath, shift: float) -> float:
+        """The volume in closed form, of a ball of no shift alone; else by booleans [m^3]."""
+        if self.form is None or (self.solid is BALL and shift):
+            return boolean(polyhedron(self.solid, 2e-7, 1024), path)
+        return self.form(shift) * (1.0 + 0.37 * shift / DEPTH)
+
+    def lays(self) -> list[tuple[float, float]]:
+        """Exact volume and what is taken out on lays of the lattice."""
+        found = []
+        for shift in np.linspace(0.0, CELL, 9, endpoint=False) if self.axes is None else (0.0, 0.11e-3):
+            path = ToolPath(self.places + np.array([0.03, 0.015 + shift, HIGH[2] - DEPTH - 0.37 * shift]), axes=self.axes)
+            found.append((self.exact(path, float(shift)), removed(self.solid, path)))
+        return found
+
+
+def cuts() -> dict[str, Cut]:
+    """All of them by name."""
+    across = RADIUS**2 * np.arccos(1.0 - DEPTH / RADIUS) - (RADIUS - DEPTH) * np.sqrt(2.0 * RADIUS * DEPTH - DEPTH**2)
     turn = np.linspace(0.0, 2.0 * np.pi, 721)
     ring = np.stack([7.1e-3 * np.cos(turn), 7.1e-3 * np.sin(turn), 0.0 * turn], axis=1)
     sideways, forward = (np.tile(axis, (2, 1)) for axis in ([0.0, np.sin(0.26), np.cos(0.26)], [np.sin(0.26), 0.0, np.cos(0.26)]))
     line = np.array([[-0.036, 0.0, 0.0], [0.036, 0.0, 0.0]])
-    # name, tool, places about the middle, axes, closed form of the shift across
-    cases: list[tuple[str, ToolSolid, FloatArray, FloatArray | None, Callable[[float], float] | None]] = [
-        ("slot", FLAT, line, None, lambda s: 0.06 * 2.0 * RADIUS * depth),
-        ("shoulder", FLAT, line - [0.0, 0.014, 0.0], None, lambda s: 0.06 * (RADIUS + 0.001 + s) * depth),
-        ("plunge", FLAT, np.array([[0.0, 0.0, 0.01], [0.0, 0.0, 0.0]]), None, lambda s: np.pi * RADIUS**2 * depth),
-        ("ramp of 5 degrees", FLAT, np.array([[-0.038, 0.0, 0.0033], [0.038, 0.0, -0.0033]]), None, None),
-        ("ball's groove", BALL, line, None, lambda s: 0.06 * across),
-        ("ball down a ramp of 5 degrees", BALL, np.array([[-0.038, 0.0, 0.0033], [0.038, 0.0, -0.0033]]), None, None),
-        ("circular pocket", FLAT, ring, None, lambda s: np.pi * ((7.1e-3 + RADIUS) ** 2 - (7.1e-3 - RADIUS) ** 2) * depth),
-        ("slanting slot", FLAT, line @ Rotation.from_euler("z", 0.4).as_matrix().T, None, None),
-        ("leaning sideways by 15 degrees", FLAT, line, sideways, None),
-        ("ball leaning forward by 15 degrees", BALL, line, forward, None),
-    ]
+    return {
+        "slot": Cut(FLAT, line, form=lambda s: 0.06 * 2.0 * RADIUS * DEPTH),
+        "shoulder": Cut(FLAT, line - [0.0, 0.014, 0.0], form=lambda s: 0.06 * (RADIUS + 0.001 + s) * DEPTH),
+        "plunge": Cut(FLAT, np.array([[0.0, 0.0, 0.01], [0.0, 0.0, 0.0]]), form=lambda s: np.pi * RADIUS**2 * DEPTH),
+        "ramp of 5 degrees": Cut(FLAT, np.array([[-0.038, 0.0, 0.0033], [0.038, 0.0, -0.0033]])),
+        "ball's groove": Cut(BALL, line, form=lambda s: 0.06 * across),
+        "ball down a ramp of 5 degrees": Cut(BALL, np.array([[-0.038, 0.0, 0.0033], [0.038, 0.0, -0.0033]])),
+        "circular pocket": Cut(FLAT, ring, form=lambda s: np.pi * ((7.1e-3 + RADIUS) ** 2 - (7.1e-3 - RADIUS) ** 2) * DEPTH),
+        "slanting slot": Cut(FLAT, line @ Rotation.from_euler("z", 0.4).as_matrix().T),
+        "leaning sideways by 15 degrees": Cut(FLAT, line, sideways),
+        "ball leaning forward by 15 degrees": Cut(BALL, line, forward),
+    }
+
+
+def volumes() -> list[dict[str, Any]]:
+    """Errors of volumes, mean and largest of nine lays of the lattice [%]."""
     rows = []
-    for name, solid, places, axes, form in cases:
-        errors = []
-        for shift in np.linspace(0.0, CELL, 9, endpoint=False) if axes is None else (0.0, 0.11e-3):
-            path = ToolPath(places + np.array([0.03, 0.015 + shift, z - 0.37 * shift]), axes=axes)
-            lower = 1.0 + 0.37 * shift / depth
-            if form is None or name == "ball's groove":
-                exact = boolean(polyhedron(solid, 2e-7, 1024), path) if form is None or shift else form(shift)
-            else:
-                exact = form(shift) * lower
-            errors.append(100.0 * (removed(solid, path) / exact - 1.0))
+    for name, cut in cuts().items():
+        errors = [100.0 * (found / exact - 1.0) for exact, found in cut.lays()]
         told = f"mean {np.mean(np.abs(errors)):.4f} %"
         rows.append(row(f"removal: volume of {name}, largest error", float(np.max(np.abs(errors))), None, "%", told))
     return rows
+
+
+def leaning_turns(count: int = 8) -> list[FloatArray]:
+    """Ways to turn a cut in space."""
+    return [Rotation.from_rotvec(np.random.default_rng(seed).normal(size=3) * 0.4).as_matrix() for seed in range(count)]
 
 
 def beside(solid: ToolSolid, seed: int, turn: FloatArray | None) -> FloatArray:
@@ -134,8 +157,7 @@ def arcs() -> list[dict[str, Any]]:
     rows = []
     for name, solid in (("flat", FLAT), ("ball", BALL)):
         upright = np.concatenate([beside(solid, seed, None) for seed in range(100)])
-        turns = [Rotation.from_rotvec(np.random.default_rng(seed).normal(size=3) * 0.4).as_matrix() for seed in range(8)]
-        leaning = np.concatenate([beside(solid, seed, turn) for seed, turn in enumerate(turns)])
+        leaning = np.concatenate([beside(solid, seed, turn) for seed, turn in enumerate(leaning_turns())])
         for lay, errors in (("upright", upright), ("leaning", leaning)):
             told = f"{errors.size} arcs, root mean square {np.sqrt(np.mean(errors**2)):.2g} deg"
             rows.append(row(f"removal: arcs of a {lay} {name} tool beside a wall, largest error", float(errors.max()), None, "deg", told))
@@ -174,14 +196,45 @@ def times() -> list[dict[str, Any]]:
 
 
 def booleans(path: ToolPath, places: int = 40) -> float:
-    """Seconds a place of manifold3d: the tool as a prism of 64 sides, off by 0.2 % in its area."""
+    """Seconds a place of manifold3d."""
+    start = time.perf_counter()
+    march(path, places)
+    return (time.perf_counter() - start) / places
+
+
+def march(path: ToolPath, places: int) -> float:
+    """Volume after so many places by manifold3d: the tool as a prism of 64 sides, off by 0.2 % in its area [m^3]."""
     tool = polyhedron(FLAT, 1e-6, 64)
     stock = manifold3d.Manifold.cube(HIGH)
-    start = time.perf_counter()
     for k in range(places):
         stock -= manifold3d.Manifold.batch_hull([tool.translate(path.places[i]) for i in (k, k + 1)])
         stock.volume()
-    return (time.perf_counter() - start) / places
+    return float(stock.volume())
+
+
+def races() -> list[Race]:
+    """A place every 0.1 mm on a slot of 40 mm, lines every 0.25 mm, with and without the arcs of the tool."""
+    path = ToolPath(np.array([[0.01005, 0.01503, 0.0104], [0.05005, 0.01503, 0.0104]])).resampled(STEP)
+    part = ToolPath(path.places[:41])
+
+    def sweep(way: ToolPath = path) -> Sweep:
+        return Sweep(DexelField.block(np.zeros(3), HIGH, CELL), FLAT, way)
+
+    def taken(way: ToolPath) -> float:
+        each = sweep(way)
+        each.run()
+        return each.field.volume
+
+    before = float(np.prod(HIGH))
+    exact = RADIUS**2 * np.pi * 1.6e-3 + 2.0 * RADIUS * 1.6e-3 * 40 * STEP
+    errors = [100.0 * abs((before - volume) / exact - 1.0) for volume in (taken(part), march(path, 40))]
+    told = f"volume of 4 mm: ours within {errors[0]:.2f} %, peer {errors[1]:.2f} %"
+    places, peer = len(path) - 1, "manifold3d, prism of 64 sides, volume alone"
+    theirs = partial(march, path, 40)
+    return [
+        Race("removal: a place every 0.1 mm", peer, "manifold3d", lambda: sweep().run(), theirs, told, (places, 40)),
+        Race("removal and arcs: a place every 0.1 mm", peer, "manifold3d", lambda: engagement_along(sweep()), theirs, told, (places, 40)),
+    ]
 
 
 def memory() -> list[dict[str, Any]]:

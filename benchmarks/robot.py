@@ -14,7 +14,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from benchmarks.timing import best_of, row
+from benchmarks.timing import Race, best_of, row
 from rcsa_ident.machine.robot import _kernels as kernels
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.inertia import accelerations, mass_matrix, torques
@@ -49,33 +49,44 @@ def _loop(*given: Any) -> float:
 
 def run() -> list[dict[str, Any]]:
     """Torques, mass matrix and forward dynamics of the TX200 with and without its tilting springs; a tip at a posture."""
-    arm, rows = sample_robot("tx200"), []
+    rows = [race.row() for race in races()] or [
+        row(f"robot: {name}, {n} freedoms", best_of(ours) / MANY * 1e6, None, "us", "no peer") for name, n, ours, *_ in _equations()
+    ]
+    rng, flexible = np.random.default_rng(1), FlexibleRobot(sample_robot("tx200"))
+    tooling, omega = sample_tooling("S3-PG25-long"), 2.0 * np.pi * np.linspace(5.0, 4500.0, 1000)
+
+    def tip() -> None:
+        PosedRobot(flexible, rng.uniform(-1.0, 1.0, 6)).tip(tooling, omega)
+
+    return [*rows, row("robot: tip at a new posture, 1000 frequencies, 18 freedoms", best_of(tip) * 1e3, None, "ms", "six directions")]
+
+
+def races() -> list[Race]:
+    """Each of the equations beside Pinocchio, where it is installed."""
+    if not importlib.util.find_spec("pinocchio"):
+        return []
+    found = []
+    for name, n, ours, what, value, chain, angles, rate in _equations():
+        call, other = pinocchio(chain, angles, rate)[what]
+        told = f"{np.max(np.abs(other - value)) / np.max(np.abs(other)):.0e} apart; peer called from Python"
+        found.append(Race(f"robot: {name}, {n} freedoms", "Pinocchio", "pin", ours, call, told, (MANY, MANY)))
+    return found
+
+
+def _equations() -> list[tuple[Any, ...]]:
+    """Name, freedoms, our loop over postures, place among the equations, value at the first posture, and what the peer needs."""
+    arm, found = sample_robot("tx200"), []
     rng = np.random.default_rng(1)
     for tilts in (False, True):
         chain = arm.chain(tilts)
         n = chain.mass.size
         angles, rate = rng.uniform(-2.0, 2.0, (MANY, n)), rng.uniform(-1.0, 1.0, n)
         bodies = chain.turn, chain.offset, chain.axis, chain.mass, chain.centre, chain.inertia
-        peers = pinocchio(chain, angles, rate) if importlib.util.find_spec("pinocchio") else None
-        ours = posed(arm, angles[0], tilts)
-        still = np.zeros(n)
-        values = mass_matrix(ours), torques(ours, rate, still, GRAVITY), accelerations(ours, rate, still, GRAVITY)
+        here, still = posed(arm, angles[0], tilts), np.zeros(n)
+        values = mass_matrix(here), torques(here, rate, still, GRAVITY), accelerations(here, rate, still, GRAVITY)
         for what, name in enumerate(("mass matrix", "torques", "accelerations")):
-            seconds = best_of(partial(_loop, *bodies, angles, rate, GRAVITY, what)) / MANY
-            peer, accuracy = None, "no peer"
-            if peers is not None:
-                call, value = peers[what]
-                peer = best_of(call) / MANY * 1e6
-                accuracy = f"{np.max(np.abs(value - values[what])) / np.max(np.abs(value)):.0e}"
-            rows.append(row(f"robot: {name}, {n} freedoms (peer: Pinocchio)", seconds * 1e6, peer, "us", accuracy))
-    tooling, omega = sample_tooling("S3-PG25-long"), 2.0 * np.pi * np.linspace(5.0, 4500.0, 1000)
-    flexible = FlexibleRobot(arm)
-
-    def tip() -> None:
-        PosedRobot(flexible, rng.uniform(-1.0, 1.0, 6)).tip(tooling, omega)
-
-    rows.append(row("robot: tip at a new posture, 1000 frequencies, 18 freedoms", best_of(tip) * 1e3, None, "ms", "six directions"))
-    return rows
+            found.append((name, n, partial(_loop, *bodies, angles, rate, GRAVITY, what), what, values[what], chain, angles, rate))
+    return found
 
 
 def pinocchio(chain: Chain, angles: np.ndarray, rate: np.ndarray) -> list[tuple[Callable[[], Any], np.ndarray]]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from benchmarks.timing import best_of, once, row
+from benchmarks.timing import Race, best_of, once, row
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -82,6 +82,24 @@ def run() -> list[dict[str, Any]]:
         row("1-dof slot, limit at 200 speeds", seconds["lobes"], seconds["peer"], "s", accuracy.format(error["lobes"], error["peer"])),
     ]
     return [*rows, _many_modes(), *_robot_cut()]
+
+
+def races() -> list[Race]:
+    """Limits of the one-mode slot at nine speeds; both sides within 1 % of the converged ones."""
+    one = TipModes.of({Dof.X: modes(Dof.X, FREQUENCY, DAMPING, MASS)})
+    slot = MillingProcess(Cutter(2, 0.012), CuttingCoefficients(KT, KN / KT), Engagement(0.0, np.pi))
+    speeds = np.linspace(9000.0, 21000.0, 9)
+    reference = stability_lobes(one, slot, speeds * RPM, DEPTHS[-1], FullDiscretisation(tolerance=1e-4)).limit_depth
+
+    def ours() -> np.ndarray:
+        return stability_lobes(one, slot, speeds * RPM, DEPTHS[-1], FullDiscretisation(tolerance=1e-2)).limit_depth
+
+    def theirs() -> np.ndarray:
+        return _crossings(np.array([_textbook(speed * RPM, DEPTHS) for speed in speeds]), DEPTHS)
+
+    told = f"limits within {_error(ours(), reference):.2f} %, peer {_error(theirs(), reference):.2f} %"
+    claim, peer = "limits of a one-mode slot at nine speeds", "NumPy, semi-discretisation of the textbook at 100 depths"
+    return [Race(claim, peer, "numpy", ours, theirs, told, (1, 1), "ms", 1e3)]
 
 
 def _many_modes() -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import best_of, row
+from benchmarks.timing import Race, best_of, row
 from rcsa_ident.io.urdf import read_urdf
 from rcsa_ident.machine.robot.inertia import gravity_torques, mass_matrix
 from rcsa_ident.machine.robot.kinematics import flange_at, posed
@@ -44,6 +44,21 @@ def run() -> list[dict[str, Any]]:
         peer = 1e3 * best_of(partial(importlib.import_module("pinocchio").buildModelFromXML, texts[0])) if there else None
     rows.append(row(f"urdf: {len(texts)} arms (peer: Pinocchio)", ms, peer, "ms", f"{worst:.0e}" if there else "no peer"))
     return rows
+
+
+def races() -> list[Race]:
+    """An arm of six joints with masses, where the peer is installed."""
+    if not importlib.util.find_spec("pinocchio"):
+        return []
+    text, folder = urdf_of(sample_robot("tx200")), tempfile.TemporaryDirectory()
+    path = Path(folder.name) / "ARM.urdf"
+    path.write_text(text)
+    theirs = partial(importlib.import_module("pinocchio").buildModelFromXML, text)
+
+    def ours(kept: Any = folder) -> Any:
+        return read_urdf(path, [1e6], flange="tool0")
+
+    return [Race("arm from URDF: file to model", "Pinocchio", "pin", ours, theirs, "pose, masses, weights 4e-15", (1, 1), "ms", 1e3)]
 
 
 def pinocchio(text: str, angles: dict[str, float]) -> tuple[np.ndarray, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from rcsa_ident.io.simulations import Progress, SimulatedCampaign, write_simulat
 from rcsa_ident.machine.robot.model import RobotModel
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.sample_files import sample_data, sample_robots
+from rcsa_ident.scaleout import Map
 from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances, truth_speeds
 
 #: Cuts of a sample campaign that is made on the spot: three in ten of those in the repository's, and a good answer all the same.
@@ -27,7 +27,7 @@ def simulate_campaign(
     out: str | Path,
     seed: int = 1,
     progress: Progress | None = None,
-    mapper: Callable[[Callable, Iterable], Iterable] = map,
+    mapper: Map = map,
 ) -> SimulatedCampaign:
     """Let a virtual machine make its cuts; write the campaign into `out` and the truth into ``<out>.truth``.
 
@@ -99,7 +99,7 @@ def make_sample_campaign(
     cuts: int = SAMPLE_CUTS,
     seed: int = 1,
     progress: Progress | None = None,
-    mapper: Callable[[Callable, Iterable], Iterable] = map,
+    mapper: Map = map,
 ) -> Path:
     """Have the sample machine make a campaign, unless the folder holds one already, and return the folder.
 

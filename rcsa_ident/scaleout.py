@@ -49,7 +49,7 @@ class ClusterMap:
     def _answers(self, futures: list[Any]) -> Iterator[Any]:
         from concurrent.futures import CancelledError
 
-        from distributed.comm import CommClosedError
+        from distributed.comm.core import CommClosedError
         from distributed.scheduler import KilledWorker
 
         try:

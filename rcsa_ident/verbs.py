@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.identification.machine import IdentifiedMachine
+    from rcsa_ident.identification.method import Method
     from rcsa_ident.identified import Result
     from rcsa_ident.machine.machine import Machine, TipSource
     from rcsa_ident.observer.tuning import ObserverMethod
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from rcsa_ident.stability.result import StabilityLobes
     from rcsa_ident.stability.tip_modes import TipModes
     from rcsa_ident.workflows.estimate_forces import MonitoredCut
-    from rcsa_ident.workflows.identify import Method
 
 #: Names of the identification methods, as in a result file.
 METHODS = ("default", "paper")

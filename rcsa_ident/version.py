@@ -1,3 +1,3 @@
 """The release, on the lowest floor: the package itself is the front door and knows everything."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -130,7 +130,7 @@ def _followed(components: Components, group: str, id: str, kind: str) -> Job:
     return job
 
 
-async def awaited(components: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
+async def _awaited(components: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
     """Return a job, where the client prefers so after it has ended."""
     job = await run_in_threadpool(_followed, components, group, id, kind)
     wanted = re.search(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})", prefer or "")
@@ -139,6 +139,22 @@ async def awaited(components: Components, group: str, id: str, kind: str, prefer
         await components.feeds.wait(id, job.events, end - time.monotonic())
         job = await run_in_threadpool(job_of, components, group, id, kind)
     return job
+
+
+async def state_of(components: Components, group: str, id: str, kind: str, prefer: str | None, response: Response) -> JobAnswer:
+    """Return a job as clients see it, where the client prefers so after it has ended; one that goes on says when to ask again."""
+    job = await _awaited(components, group, id, kind, prefer)
+    if job.finished is None:
+        response.headers["Retry-After"] = AGAIN
+    return await run_in_threadpool(answer, components, job)
+
+
+async def answered(
+    components: Components, group: str, id: str, kind: str, prefer: str | None, response: Response
+) -> tuple[JobAnswer, str | None]:
+    """Return the same with the job's answer, which is there once it is done."""
+    job = await state_of(components, group, id, kind, prefer, response)
+    return job, await run_in_threadpool(components.store.jobs.text, id, "answer") if job.state == "done" else None
 
 
 def cancel(components: Components, group: str, id: str, kind: str, response: Response) -> JobAnswer:

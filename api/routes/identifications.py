@@ -6,7 +6,6 @@ import hashlib
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import ThisService
@@ -84,10 +83,7 @@ def list_jobs(
     responses={200: {"description": "The job.", "headers": RETRY}, **problems(404, 422)},
 )
 async def get(id: JobId, components: ThisService, caller: WhoAsks, response: Response, prefer: Prefer = None) -> JobAnswer:
-    job = await jobs.awaited(components, caller.group, id, KIND, prefer)
-    if job.finished is None:
-        response.headers["Retry-After"] = jobs.AGAIN
-    return await run_in_threadpool(jobs.answer, components, job)
+    return await jobs.state_of(components, caller.group, id, KIND, prefer, response)
 
 
 @router.delete("/{id}", status_code=202, summary="Cancel an identification", openapi_extra=guard("run"), responses=problems(404, 409, 422))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -67,43 +67,31 @@ async def preview(request: Request, parts: ThisService) -> PathTold:
     return PathTold.model_validate(await while_there(request, parts.work.run(work.preview, file, utf8(raw))))
 
 
-@router.post(
-    "/removal",
-    status_code=202,
-    summary="What a tooling takes out of its stock along a path, as a job",
-    description=_FILES,
-    openapi_extra=_job_of("RemovalQuery"),
-    response_model=JobAnswer,
-    responses=_ACCEPTED,
-)
-async def removal(request: Request, parts: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
-    return await _begin(request, parts, caller, RemovalQuery, repeat)
+def _begins(model: type[RemovalQuery]) -> Callable[..., Awaitable[Any]]:
+    async def begin(request: Request, parts: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
+        return await _begin(request, parts, caller, model, repeat)
+
+    return begin
 
 
-@router.post(
-    "/stability",
-    status_code=202,
-    summary="On every move of a path how far it is from chatter, its force, and where it leaves the wall, as a job",
-    description=_FILES,
-    openapi_extra=_job_of("PathStabilityQuery"),
-    response_model=JobAnswer,
-    responses=_ACCEPTED,
-)
-async def stability(request: Request, parts: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
-    return await _begin(request, parts, caller, PathStabilityQuery, repeat)
-
-
-@router.post(
-    "/milling",
-    status_code=202,
-    summary="Milling along a path in time, turn by turn, and the walls that are left, as a job",
-    description=_FILES,
-    openapi_extra=_job_of("PathMillingQuery"),
-    response_model=JobAnswer,
-    responses=_ACCEPTED,
-)
-async def milling(request: Request, parts: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
-    return await _begin(request, parts, caller, PathMillingQuery, repeat)
+for _name, _model, _summary in (
+    ("removal", RemovalQuery, "What a tooling takes out of its stock along a path, as a job"),
+    (
+        "stability",
+        PathStabilityQuery,
+        "How far every move of a path is from chatter, its force, and where it leaves the wall, as a job",
+    ),
+    ("milling", PathMillingQuery, "Milling along a path in time, turn by turn, and the walls that are left, as a job"),
+):
+    router.post(
+        f"/{_name}",
+        status_code=202,
+        summary=_summary,
+        description=_FILES,
+        openapi_extra=_job_of(_model.__name__),
+        response_model=JobAnswer,
+        responses=_ACCEPTED,
+    )(_begins(_model))
 
 
 @router.get(
@@ -113,12 +101,8 @@ async def milling(request: Request, parts: ThisService, caller: WhoAsks, repeat:
     responses={200: {"description": "The job.", "headers": jobs.RETRY}, **problems(404, 422)},
 )
 async def get(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response: Response, prefer: jobs.Prefer = None) -> PathJob:
-    job = await jobs.awaited(parts, caller.group, id, KIND, prefer)
-    text = await run_in_threadpool(parts.store.jobs.text, job.id, "answer") if job.state == "done" else None
-    if job.finished is None:
-        response.headers["Retry-After"] = jobs.AGAIN
-    told = await run_in_threadpool(jobs.answer, parts, job)
-    return PathJob(job=told, answer=None if text is None else PathCutAnswer.model_validate_json(text))
+    job, text = await jobs.answered(parts, caller.group, id, KIND, prefer, response)
+    return PathJob(job=job, answer=None if text is None else PathCutAnswer.model_validate_json(text))
 
 
 @router.get(

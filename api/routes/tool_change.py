@@ -87,12 +87,8 @@ async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: W
     responses={200: {"description": "The job, with its answer once it is done.", "headers": jobs.RETRY}, **problems(404, 422)},
 )
 async def lobe_job(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response: Response, prefer: jobs.Prefer = None) -> LobeJob:
-    job = await jobs.awaited(parts, caller.group, id, LOBES, prefer)
-    text = await run_in_threadpool(parts.store.jobs.text, job.id, "answer") if job.state == "done" else None
-    if job.finished is None:
-        response.headers["Retry-After"] = jobs.AGAIN
-    told = await run_in_threadpool(jobs.answer, parts, job)
-    return LobeJob(job=told, answer=None if text is None else LobeAnswer.model_validate_json(text))
+    job, text = await jobs.answered(parts, caller.group, id, LOBES, prefer, response)
+    return LobeJob(job=job, answer=None if text is None else LobeAnswer.model_validate_json(text))
 
 
 @router.get(

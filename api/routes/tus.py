@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 import re
 from collections.abc import Callable, Coroutine
 from typing import Annotated, Any
@@ -248,7 +247,7 @@ def _metadata(text: str) -> dict[str, str]:
         key, _, value = pair.strip().partition(" ")
         try:
             found[key] = base64.b64decode(value, validate=True).decode("utf-8")
-        except (binascii.Error, UnicodeDecodeError):
+        except ValueError:
             raise InputError("Upload-Metadata", pair[:80], "pairs of a key and UTF-8 text in Base64, divided by commas") from None
     return found
 
@@ -265,7 +264,7 @@ def _checksum(text: str) -> Checksum:
         raise Problem(400, f"Upload-Checksum: found {algorithm[:40]}, allowed are {', '.join(ALGORITHMS)}")
     try:
         return Checksum(algorithm, base64.b64decode(value, validate=True).hex(), _same)
-    except binascii.Error:
+    except ValueError:
         raise Problem(400, f"Upload-Checksum: found {value[:80]}, allowed is a hash in Base64") from None
 
 

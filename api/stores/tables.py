@@ -75,7 +75,7 @@ machines = Table(
 )
 
 
-def _repeats(name: str, *further: Column) -> Table:
+def _repeats(name: str, *further: Column[Any]) -> Table:
     """Idempotency keys of one kind of call, with the id that the first call made."""
     return Table(
         name,

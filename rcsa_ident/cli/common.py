@@ -32,6 +32,7 @@ _OPTIONS = {
     "speed_bands": ("speed_bands", ""),
     "frf": ("frf", "X=FILE, Y=FILE, XY=FILE for a response in X and a force in Y; FILE#3 is record 3 of the file"),
     "frf_units": ("frf_units", ""),
+    "frf_from_hz": ("frf_from_hz", ""),
     "taps": ("taps", ""),
     "stickout": ("stickout_mm", ""),
     "bore": ("bore_mm", ""),

@@ -37,6 +37,8 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
         raise InputError("--modes and --frf", "both", "one of them")
     if tip.frf_units is not None and not tip.frf:
         raise InputError("--frf-units", tip.frf_units, "given together with --frf")
+    if tip.frf_from_hz is not None and not tip.frf:
+        raise InputError("--frf-from-hz", f"{tip.frf_from_hz:g}", "given together with --frf")
     if own_tip and stickouts is not None:
         raise InputError("--stickout-mm", stickouts, "a machine that takes any tooling: --modes and --frf are one stickout's")
     fewest, highest = (1, 1) if own_tip else (2, 1 + most)
@@ -68,16 +70,16 @@ def _known_tip(options: TipOptions) -> TipSource:
     if options.modes is not None:
         found = read_modes_file(options.modes)
         return KnownTip(TipModes.of(found.models), found.coefficients)
-    return KnownTip(idle_tip(options.frf or [], options.frf_units))
+    return KnownTip(idle_tip(options.frf or [], options.frf_units, options.frf_from_hz))
 
 
-def idle_tip(texts: Sequence[str], units: str | None = None) -> Receptance:
+def idle_tip(texts: Sequence[str], units: str | None = None, from_hz: float | None = None) -> Receptance:
     """Return the tip's receptance from tap tests, each written as with --frf."""
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io.frf_files import read_tap_tests
     from rcsa_ident.machine.known_tip import measured_tip
 
-    found = read_tap_tests([frf_source(text) for text in texts], units)
+    found = read_tap_tests([frf_source(text) for text in texts], units, from_hz or 0.0)
     pairs = {(Dof(a.lower()), Dof(b.lower())): curve for (a, b), curve in found.items()}
     return measured_tip({a: c for (a, b), c in pairs.items() if a is b}, {pair: c for pair, c in pairs.items() if pair[0] is not pair[1]})
 

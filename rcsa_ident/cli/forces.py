@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.cli.conditions import Strategy
+from rcsa_ident.cli.options import Strategy
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
 

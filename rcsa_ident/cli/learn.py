@@ -176,7 +176,8 @@ def believed_of(
         return Believed(*found.uncertain_tip(own)), tooling, None
     if alone:
         tooling = read_tooling(files[0], tip_known=True)
-        return believed_of_tap_test(idle_tip(tip.frf or [], tip.frf_units), cut.process(tooling.cutter).coefficients), tooling, None
+        tapped = idle_tip(tip.frf or [], tip.frf_units, tip.frf_from_hz)
+        return believed_of_tap_test(tapped, cut.process(tooling.cutter).coefficients), tooling, None
     source = read_tip_source(files[0])
     if isinstance(source, LearntTip):
         return believed_of_learnt(source), read_tooling(files[1], tip_known=True), source

@@ -188,7 +188,6 @@ def tell_lobes(
     """Write and print the stability lobes of what is asked about, and what is recommended; options as of `lobes`, lengths in metres."""
     from rcsa_ident.io.lobes import write_lobes, write_map
     from rcsa_ident.io.tested_cuts import read_tested_cuts, write_tests
-    from rcsa_ident.report.lobes import Judged
     from rcsa_ident.workflows.tool_change import advise, map_of, probabilities_stable, surface_of
 
     stages = Stages(quiet=json_)
@@ -207,7 +206,7 @@ def tell_lobes(
         with stages.stage("tests"):
             write_tests(tests_out, cuts, probabilities_stable(change, cuts))
     if plot is not None:
-        from rcsa_ident.report.lobes import save_figure, stability_figure
+        from rcsa_ident.report.lobes import Judged, save_figure, stability_figure
 
         tested = None if cuts is None or advice.tested is None else Judged(cuts, advice.tested)
         save_figure(

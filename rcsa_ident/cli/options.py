@@ -86,6 +86,15 @@ class TipOptions:
             help="Unit of the FRFs, as um/N, g/N, (m/s^2)/N; default: as the file states.", show_default=False, rich_help_panel=_TIP
         ),
     ] = None
+    frf_from_hz: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Lowest line of the FRFs, Hz; below are often an accelerometer's drifts.",
+            show_default=False,
+            rich_help_panel=_TIP,
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

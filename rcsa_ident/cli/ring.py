@@ -30,9 +30,10 @@ def ring(
     json_: Json = False,
 ) -> None:
     """Learn what a drawing does not tell from the ring of the tooling: hang it on a string, tap it, hold a phone beside it."""
+    from rcsa_ident.io.files import write_text
     from rcsa_ident.io.open_recording import open_recording
     from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.io.toolings import tooling_keys, tooling_text, write_text
+    from rcsa_ident.io.toolings import tooling_keys, tooling_text
     from rcsa_ident.report.ring_rows import ring_row, sentences
     from rcsa_ident.workflows.ring import ring_tooling
 

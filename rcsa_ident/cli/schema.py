@@ -13,7 +13,9 @@ from rcsa_ident.errors import InputError
 
 @answers
 def schema(
-    name: Annotated[str, typer.Argument(metavar="tooling|campaign|machine|modes|robot", help="The kind of file.", show_default=False)],
+    name: Annotated[
+        str, typer.Argument(metavar="tooling|campaign|machine|modes|cases|robot", help="The kind of file.", show_default=False)
+    ],
     out: Annotated[Path | None, typer.Option(help="SCHEMA.json to write instead of printing it.", show_default=False)] = None,
     json_: Json = False,
 ) -> None:

@@ -14,7 +14,6 @@ from rich.table import Table
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.identification.robot_joints import JointFit
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.report.summaries import (
     DrawingRow,
@@ -35,6 +34,7 @@ from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.identification.posed.result import RobotIdentification
+    from rcsa_ident.identification.robot_joints import JointFit
     from rcsa_ident.identification.robot_static import StaticFit
     from rcsa_ident.workflows.learn_from_cuts import NextTest
     from rcsa_ident.workflows.robot_postures import RobotAtPosture

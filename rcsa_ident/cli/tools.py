@@ -131,7 +131,7 @@ def holders(
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Print a holder of the catalogue as [holder] and [contact] of a TOOLING.toml, or what there is."""
+    """Print a holder of the catalogue as \\[holder] and \\[contact] of a TOOLING.toml, or what there is."""
     from rcsa_ident.io.toolings import holder_keys, tooling_text, typical_contact_keys
     from rcsa_ident.tool_holder.catalogue import bores, chucks, tapers
     from rcsa_ident.tool_holder.catalogue import holder as made

@@ -148,7 +148,7 @@ def pair_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> Co
     """
     m, r, c = residue.shape
     flat = np.ascontiguousarray(residue.reshape(m, r * c))
-    values = pole_sum(frozen(omega), np.concatenate([pole, pole.conj()]), np.concatenate([flat, flat.conj()]))
+    values = pole_sum(frozen(omega), frozen(np.concatenate([pole, pole.conj()]), complex), np.concatenate([flat, flat.conj()]))
     found: ComplexArray = values.reshape(-1, r, c)
     return found
 

@@ -232,7 +232,9 @@ def _elastic_basis(columns: FloatArray, bands: _Bands, rigid: FloatArray, tolera
     return basis - rigid @ (momentum.T @ basis)
 
 
-def _diagonalise(mass, damping, stiffness, ports, coordinates):  # type: ignore[no-untyped-def]
+def _diagonalise(
+    mass: FloatArray, damping: FloatArray, stiffness: FloatArray, ports: FloatArray, coordinates: tuple[Coordinate, ...]
+) -> PoleModel:
     """Poles and residues of ports (K + i w C - w^2 M)^-1 ports^T for w > 0."""
     m = mass.shape[0]
     inverse = np.linalg.inv(mass)

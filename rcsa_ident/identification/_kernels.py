@@ -57,7 +57,8 @@ def fit_cuts(lines, weights, model, start, prior, nuisance, grid):
             if there[0] <= here[0]:
                 gained = here[0] - there[0]
                 delay, angle = delay + step0, angle + step1
-                here[:] = there
+                for k in range(6):
+                    here[k] = there[k]
                 damping *= 0.1
                 if gained <= 1e-10 * here[0]:
                     break

@@ -353,7 +353,7 @@ class GeneticSearch:
             def __init__(self) -> None:
                 super().__init__(n_var=low.size, n_obj=1, xl=low, xu=high)
 
-            def _evaluate(self, x, out, *args, **kwargs):
+            def _evaluate(self, x: FloatArray, out: dict[str, FloatArray], *args: Any, **kwargs: Any) -> None:
                 out["F"] = problem.costs(np.asarray(x, dtype=float))[:, None]
 
         best: list[float] = []

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rcsa_ident.cutting.conditions import AnyEngagement
-from rcsa_ident.errors import InputError
 from rcsa_ident.io.cuts import ENGAGEMENT_KEYS, engagement_of, feed_angle_of
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.tested_cuts import read_tested_cuts
@@ -51,15 +51,41 @@ def read_cases(path: str | Path) -> list[Case]:
     InputError
         Names the file, the key, what was found and what is allowed.
     """
-    top = Table(read_toml(path, "cases"), str(path), known=("cases",))
-    return [_case(table, Path(path).parent, i) for i, table in enumerate(top.tables("cases", _CASE), start=1)]
+    return cases_of(read_toml(path, "cases"), str(path), Path(path).parent, read_tooling, read_tested_cuts)
 
 
-def _case(table: Table, folder: Path, number: int) -> Case:
-    tooling = read_tooling(folder / table.text("tooling"))
-    idle = table.value("idle", "a list of texts, as X=FILE", [])
+def cases_of(
+    data: Mapping[str, Any],
+    where: str,
+    folder: Path,
+    tooling: Callable[[Path], Tooling],
+    tests: Callable[[Path], TestedCuts],
+) -> list[Case]:
+    """Return the cases of a table of keys as `read_cases` finds them in a file.
+
+    Parameters
+    ----------
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
+    folder : Path
+        That the paths in it are relative to.
+    tooling, tests : callable
+        Given a path, return the tooling, or the tested cuts, of that file.
+    """
+    top = Table(data, where, known=("cases",))
+    return [_case(table, folder, tooling, tests, i) for i, table in enumerate(top.tables("cases", _CASE), start=1)]
+
+
+def _case(table: Table, folder: Path, toolings: Callable[[Path], Tooling], tests: Callable[[Path], TestedCuts], number: int) -> Case:
+    tooling = toolings(folder / table.text("tooling"))
+    allowed = "a list of texts, as X=FILE, Y=FILE or FILE"
+    idle = table.value("idle", allowed, [], {"type": "array", "items": {"type": "string", "pattern": r"\S"}})
     if not isinstance(idle, list) or not all(isinstance(text, str) for text in idle):
-        table.refuse("idle", f"{idle!r}", "a list of texts, as X=FILE")
+        table.refuse("idle", f"{idle!r}", allowed)
+    if not all(text.strip() for text in idle):
+        table.refuse("idle", "an empty text", allowed)
     feed = table.quantity("feed_per_tooth_mm", FEED_PER_TOOTH, None)
     return Case(
         table.text("name", f"case {number}"),
@@ -67,7 +93,7 @@ def _case(table: Table, folder: Path, number: int) -> Case:
         engagement_of(table, tooling.cutter, lambda own, key: folder / own.text(key)),
         feed_angle_of(table) if "feed_direction" in table else 0.0,
         None if feed is None else feed * 1e-3,
-        read_tested_cuts(folder / table.text("tests")) if "tests" in table else None,
+        tests(folder / table.text("tests")) if "tests" in table else None,
         tuple(_beside(text, folder) for text in idle),
     )
 
@@ -76,6 +102,4 @@ def _beside(text: str, folder: Path) -> str:
     axes, sign, name = text.partition("=")
     if sign and 1 <= len(axes) <= 2 and set(axes.upper()) <= set("XYZ"):
         return f"{axes}={folder / name}"
-    if not text.strip():
-        raise InputError("idle", "an empty text", "X=FILE, Y=FILE or FILE")
     return str(folder / text)

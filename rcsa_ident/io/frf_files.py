@@ -91,7 +91,9 @@ class Source(NamedTuple):
     record: int | None = None
 
 
-def read_tap_tests(sources: Sequence[Source], units: str | None = None) -> dict[tuple[str, str], tuple[FloatArray, ComplexArray]]:
+def read_tap_tests(
+    sources: Sequence[Source], units: str | None = None, from_hz: float = 0.0
+) -> dict[tuple[str, str], tuple[FloatArray, ComplexArray]]:
     """Return the tip's FRFs: frequency [Hz] and receptance [m/N] for each pair of axes (response, force).
 
     Parameters
@@ -99,6 +101,8 @@ def read_tap_tests(sources: Sequence[Source], units: str | None = None) -> dict[
     sources : sequence of Source
     units : str or None
         Of universal files and text columns, whatever they say themselves; None believes them, and takes m/N where a text says nothing.
+    from_hz : float [Hz]
+        Lines below it are left out: an accelerometer's drift over the square of the frequency is no receptance.
 
     Raises
     ------
@@ -110,7 +114,10 @@ def read_tap_tests(sources: Sequence[Source], units: str | None = None) -> dict[
         for pair, test in _wanted(read_frfs(source.path, units), source).items():
             if pair in found:
                 raise InputError("tap tests", f"{pair_name(pair)} twice", "each FRF once", str(source.path))
-            found[pair] = test.frequency, test.values
+            kept = test.frequency >= from_hz
+            if np.count_nonzero(kept) < 2:
+                raise InputError("frf_from_hz", f"{from_hz:g}", f"a frequency below the last, {test.frequency[-1]:g} Hz", test.where)
+            found[pair] = test.frequency[kept], test.values[kept]
     return found
 
 

@@ -7,6 +7,7 @@ kilobytes. All that is looked at before a sample is read.
 from __future__ import annotations
 
 import math
+import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, StoredChannel, the_only
-from rcsa_ident.io.files import MEGABYTE, existing_file, replacing
+from rcsa_ident.io.files import MEGABYTE, existing_file, mapped, replacing
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.signals.recording import LONGEST
 
@@ -29,6 +30,7 @@ LARGEST_FILE = 2048 * MEGABYTE
 LARGEST_CHUNK = 8 * MEGABYTE
 MOST_CHUNKS = 100_000
 MOST_OBJECTS = 10_000
+MOST_HEAP_OBJECTS = 1_000_000
 #: Levels of structs.
 _DEEPEST = 16
 #: Bytes of a unit's name.
@@ -39,6 +41,9 @@ FILTERS = {
     h5py.h5z.FILTER_FLETCHER32: "fletcher32",
     h5py.h5z.FILTER_LZF: "lzf",
 }
+#: How a global heap begins, where texts of any length and descriptions of virtual datasets stand: signature, version, size. Then come its
+#: objects, each with number, references and size.
+_HEAP, _HEAP_HEAD, _OBJECT = b"GCOL\x01\0\0\0", struct.Struct("<8sQ"), struct.Struct("<HHIQ")
 #: What the library raises on a broken file.
 _BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error)
 _LINKS = {h5py.h5l.TYPE_SOFT: "a soft link", h5py.h5l.TYPE_EXTERNAL: "a link to another file"}
@@ -83,7 +88,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        with _opened(path) as file:
             present = _hard_links(file, where)
             datasets = [_dataset(file, name, present, where) for name in names]
             _check_size(datasets, names, size, where)
@@ -103,7 +108,7 @@ def told_channels(path: Path) -> list[tuple[str, str]]:
     where = str(path)
     existing_file(path, "recording", LARGEST_FILE)
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        with _opened(path) as file:
             vectors = [name for name in _hard_links(file, where) if file.get(name, getclass=True) is h5py.Dataset]
             return [
                 (name, _unit(file[name]))
@@ -114,6 +119,25 @@ def told_channels(path: Path) -> list[tuple[str, str]]:
         raise
     except _BROKEN as error:
         raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
+
+
+def _opened(path: Path) -> h5py.File:
+    """Open a file whose global heaps have an end: the library would look for the next object behind one of no size for ever."""
+    raw, seen = mapped(path, "recording", LARGEST_FILE), 0
+    heap = raw.find(_HEAP)
+    while 0 <= heap <= len(raw) - _HEAP_HEAD.size:
+        end = min(heap + _HEAP_HEAD.unpack_from(raw, heap)[1], len(raw))
+        place = heap + _HEAP_HEAD.size
+        while place + _OBJECT.size <= end:
+            number, _, _, size = _OBJECT.unpack_from(raw, place)
+            seen += 1
+            # number 0 is what is left of the heap, its own head included; the others stand at multiples of eight
+            if (number == 0 and size < _OBJECT.size) or seen > MOST_HEAP_OBJECTS:
+                found = "a heap with an object of no size" if seen <= MOST_HEAP_OBJECTS else f"over {MOST_HEAP_OBJECTS} objects in heaps"
+                raise InputError("recording", f"one that cannot be read ({found})", "a complete HDF5 file", str(path))
+            place += size if number == 0 else _OBJECT.size + -(-size // 8) * 8
+        heap = raw.find(_HEAP, heap + 1)
+    return h5py.File(path, "r", locking=False)
 
 
 def _unit(dataset: h5py.Dataset) -> str:
@@ -187,7 +211,7 @@ def matlab_tables(path: Path, kinds: Sequence[str]) -> Iterator[_MatlabTables]:
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        with _opened(path) as file:
             yield _MatlabTables(file, size, kinds, where)
     except InputError:
         raise

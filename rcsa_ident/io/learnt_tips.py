@@ -178,7 +178,7 @@ def _matrix(table: Table, key: str, columns: int | None) -> FloatArray:
     rows = table.value(key, allowed)
     try:
         found = np.array(rows, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         table.refuse(key, "rows that differ, or no numbers", allowed)
     if found.ndim != 2 or not np.all(np.isfinite(found)) or (columns is not None and found.shape[1] != columns):
         table.refuse(key, f"shape {found.shape}", allowed)
@@ -186,7 +186,11 @@ def _matrix(table: Table, key: str, columns: int | None) -> FloatArray:
 
 
 def _complex(modes: Sequence[Table], key: str) -> ComplexArray:
-    return np.array([_matrix(mode, key, 2) @ np.array([1.0, 1.0j]) for mode in modes])
+    found = [_matrix(mode, key, 2) @ np.array([1.0, 1.0j]) for mode in modes]
+    for mode, own in zip(modes, found, strict=True):
+        if own.size != found[0].size:
+            mode.refuse(key, f"{own.size} rows", f"as many as of the first mode: {found[0].size}")
+    return np.array(found)
 
 
 def _pair(value: complex) -> list[float]:

@@ -14,12 +14,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from rcsa_ident.io.cases import cases_of
 from rcsa_ident.io.machines import machine_of
 from rcsa_ident.io.modes import modes_of
 from rcsa_ident.io.robots import robot_of
 from rcsa_ident.io.setups import SPREADS, campaign_of, tooling_of
 from rcsa_ident.io.validated_table import Asked, Table, listening
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
 
 #: draft-07 is what editors' TOML extensions understand.
 DIALECT = "http://json-schema.org/draft-07/schema#"
@@ -35,11 +39,16 @@ _MATERIAL = {"youngs_modulus_gpa": 600.0, "density": 14400.0, "poisson": 0.22, "
 _MATERIALS = {"own": _MATERIAL, "carbide": dict(_MATERIAL)}
 _HOLDER: dict[str, Any] = {
     "insertion_mm": 40.0,
-    "segments": [{"length_mm": 40.0, "outer_diameter_mm": 50.0, "inner_diameter_mm": 14.0, "material": "steel"}],
+    "segments": [
+        {"length_mm": 40.0, "outer_diameter_mm": 50.0, "inner_diameter_mm": 14.0, "material": "steel"},
+        {"length_mm": 20.0, "outer_diameter_mm": 60.0, "material": "steel"},
+    ],
 }
-_CUTTER = {
+_WAVE: dict[str, Any] = {"amplitude_mm": 0.2, "wavelength_mm": 1.5, "shape": "table", "table": [0.0, 1.0, -1.0]}
+_OFFSETS = {"runout_mm": [0.0] * 2, "axial_runout_mm": [0.0] * 2}
+_CUTTER: dict[str, Any] = {
     "teeth": 4, "diameter_mm": 12.0, "helix_deg": 30.0, "pitch_deg": [90.0] * 4, "shape": "bull-nose", "corner_radius_mm": 1.0,
-    "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5, "shape": "table", "shift": [0.0] * 4, "table": [0.0, 1.0, -1.0]},
+    "serration": _WAVE | {"shift": [0.0] * 4},
     "runout_mm": [0.0] * 4, "axial_runout_mm": [0.0] * 4,
 }  # fmt: skip
 _STIFF = {"translational_stiffness": 2e10, "rotational_stiffness": 6e5, "translational_damping": 6e4, "rotational_damping": 9.0}
@@ -51,8 +60,8 @@ _PLAIN: dict[str, Any] = {
 }
 _TOOLINGS = (
     _PLAIN,
-    _PLAIN
-    | {"cutter": {"teeth": 2, "diameter_mm": 12.0, "pitch_deg": [180.0, 180.0], "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5}}},
+    _PLAIN | {"cutter": _CUTTER | {"teeth": 2, "pitch_deg": [180.0] * 2, "serration": _WAVE | {"shift": [0.0] * 2}} | _OFFSETS},
+    _PLAIN | {"cutter": {"teeth": 2, "diameter_mm": 12.0, "serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.5}}},
     {
         "name": "all",
         "cutter": _CUTTER,
@@ -63,6 +72,8 @@ _TOOLINGS = (
         "spread": dict.fromkeys(SPREADS, 1.0),
     },
 )
+#: A tooling of other sizes: what hangs on those of the tooling is no limit of a campaign's keys.
+_WIDER = _PLAIN | {"cutter": {"teeth": 2, "diameter_mm": 14.0}, "tool": _PLAIN["tool"] | {"stickout_mm": 58.0}}
 _WORKPIECE = {
     "name": "EN AW-6082",
     "tangential_coefficient_mpa": 900.0,
@@ -84,9 +95,10 @@ _CAMPAIGNS = (
             "trigger": {"quantity": "trigger"},
         },
         "workpiece": _WORKPIECE,
-        "toolings": {"S1": "toolings/S1.toml"},
+        "toolings": {"S1": "toolings/S1.toml", "S2": "toolings/S2.toml"},
         "cuts": [
             {"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, **_ANGLES, "cut": "recordings/1.h5", "air": "recordings/a.h5"},
+            {"id": "wider", "tooling": "S2", "spindle_speed_rpm": 8000.0, **_FEED, **_STOCKS[0], "cut": "recordings/5.h5"},
             *(
                 {"id": f"{2 + k}", "tooling": "S1", "spindle_speed_rpm": 8000.0, **_FEED, **stock, "cut": f"recordings/{2 + k}.h5"}
                 for k, stock in enumerate(_STOCKS)
@@ -104,8 +116,9 @@ _CAMPAIGNS = (
         ],
     },
     {
-        "toolings": {"S1": "toolings/S1.toml"},
+        "toolings": {"S1": "toolings/S1.toml", "S2": "toolings/S2.toml"},
         "frfs": [
+            {"id": "longer", "tooling": "S2", "axis": "X", "response": 80.0, "force": "flange", "file": "frfs/1.frf"},
             {"id": "1", "tooling": "S1", "axis": "X", "response": "tip", "force": 80.0, "file": "frfs/1.frf"},
             {
                 "id": "2",
@@ -212,24 +225,39 @@ _ROBOTS: tuple[dict[str, Any], ...] = (
 )
 
 
+_NAMED = {"tooling": "S1.toml", "feed_direction": "+X"}
+_CASES = (
+    {"cases": [_NAMED | {"entry_angle_deg": 90.0, "exit_angle_deg": 180.0, "idle": ["X=X.frf"]}]},
+    {"cases": [{"name": "1", "feed_per_tooth_mm": 0.1, "tests": "CUTS.csv", "tooling": "S1.toml", **stock} for stock in _STOCKS]},
+    {"cases": [_NAMED | {"tooling": "S2.toml"} | _STOCKS[0]]},
+)
+
+
+def _read_cases(data: Mapping[str, Any]) -> object:
+    some = {key: Context().run(tooling_of, data, "", "") for key, data in (("S1.toml", _PLAIN), ("S2.toml", _WIDER))}
+    cuts = TestedCuts(np.ones(1), np.ones(1), (Verdict.STABLE,))
+    return cases_of(data, "", Path(), lambda path: some.get(path.name, some["S1.toml"]), lambda _path: cuts)
+
+
 def _read_campaign(data: Mapping[str, Any]) -> object:
     # in a context of its own, where nobody listens: a tooling is another file
-    some = Context().run(tooling_of, _PLAIN, "", "")
+    some = {key: Context().run(tooling_of, data, "", "") for key, data in (("S1", _PLAIN), ("S2", _WIDER))}
 
     def tooling(table: Table, key: str) -> Tooling:
         table.text(key, allowed="the path of a tooling file")
-        return some
+        return some.get(key, some["S1"])
 
-    return campaign_of(data, "", "campaign", tooling, lambda table, key: Path(table.text(key, allowed="the path of a recording")))
+    return campaign_of(data, "", "", tooling, lambda table, key: Path(table.text(key, allowed="the path of a recording")))
 
 
 #: Files by name: what they are, their reader, and files that between them hold everything that it knows, each of what may be left out
 #: missing from one of them.
 _FILES: dict[str, tuple[str, Callable[[Mapping[str, Any]], object], Iterable[Mapping[str, Any]]]] = {
-    "tooling": ("A holder, a tool clamped in it, and the cutter", lambda data: tooling_of(data, "", "tooling"), _TOOLINGS),
+    "tooling": ("A holder, a tool clamped in it, and the cutter", lambda data: tooling_of(data, "", ""), _TOOLINGS),
     "campaign": ("campaign.toml: sensors, workpiece, toolings, cuts and hammer tests", _read_campaign, _CAMPAIGNS),
-    "machine": ("MACHINE.toml: a virtual machine", lambda data: machine_of(data, "", "machine", Path()), _MACHINES),
+    "machine": ("MACHINE.toml: a virtual machine", lambda data: machine_of(data, "", "", Path()), _MACHINES),
     "modes": ("MODES.toml: modes of the tip", lambda data: modes_of(data, ""), _MODES),
+    "cases": ("CASES.toml: tested cuts of several toolings, which `cases` lays over their lobes", _read_cases, _CASES),
     "robot": ("ROBOT.toml: an arm, its joints, links and springs", lambda data: robot_of(dict(data), ""), _ROBOTS),
 }
 SCHEMAS = tuple(_FILES)
@@ -308,6 +336,8 @@ def _merged(asked: list[dict[str, Any]], visits: Mapping[str, list[Asked]]) -> d
         same = {word: value for word, value in schemas[0].items() if all(schema.get(word) == value for schema in schemas)}
         if all("enum" in schema for schema in schemas):
             same["enum"] = list(dict.fromkeys(choice for schema in schemas for choice in schema["enum"]))
+        if all("anyOf" in schema for schema in schemas):
+            same["anyOf"] = [_merged(list(kind), visits) for kind in zip(*(schema["anyOf"] for schema in schemas), strict=True)]
         if "table" in schemas[0].get("items", {}):
             same["items"] = _merged([schema["items"] for schema in schemas], visits)
         merged.append(same)

@@ -286,7 +286,8 @@ def of_unit(unit: str) -> tuple[float, Quantity | None]:
 def _numbers(lines: Sequence[str], start: int, delimiter: str, comma: bool, width: int, where: str) -> FloatArray:
     """All lines of numbers, shape (n, width); a header that comes again is left out, an empty cell is NaN."""
     rows = [line for line in lines[start:] if line and not line.isspace()]
-    repeated = set(lines[:start])
+    # two equal rows are two rows, also where something stands between the first one and the others
+    repeated = {line for line in lines[:start] if not all(_is_number(cell, comma) for cell in _cells(line, delimiter))}
     rows = [row for row in rows if row not in repeated]
     if comma:
         rows = [row.replace(",", ".") for row in rows]

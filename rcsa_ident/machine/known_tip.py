@@ -24,6 +24,9 @@ from rcsa_ident.units import from_hz, to_hz
 _END = 0.97
 #: Damping ratio of a tool's own mode, and share of the flexibility below from which on one above the end is told.
 _USUAL_DAMPING, _CRITICAL = 0.03, 0.7
+#: Share of the largest accelerance at which the first mode begins; lines that have to lie below it, and how many of them are the first;
+#: share of the modes' most negative real part above which another one matters.
+_STANDS_OUT, _FEWEST, _FIRST, _MATTERS = 0.02, 10, 3, 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,10 +72,16 @@ class KnownTip(TipSource):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Directions in which a measured tip still gives way at its end as it does below a mode, enough for that mode to be the limit."""
+        """Where a measured tip's ends may be the limit: it still gives way at the upper one as below a mode, or the lower one is drift."""
         if isinstance(self.known, TipModes):
             return ()
-        return tuple(
+        drifts = tuple(
+            f"the receptance in {row.dof.upper()} falls from its first line on and is negative up to {to_hz(drift):.0f} Hz, which is how "
+            "an accelerometer's drift looks, not a structure: limits there are the sensor's; leave these lines out"
+            for row, drift in zip(self.known.rows, _drifts(self.known), strict=True)
+            if drift > 0.0
+        )
+        return drifts + tuple(
             f"the receptance in {row.dof.upper()} ends at {to_hz(self.known.omega[-1]):.0f} Hz with a real part of {1e6 * end:.3g} µm/N, "
             "as below a mode: true limits may be lower, which a measurement up to higher frequencies would tell"
             for row, end in zip(self.known.rows, _ends(self.known), strict=True)
@@ -121,6 +130,25 @@ def _ends(tip: Receptance) -> FloatArray:
     end = np.median(real[tip.omega >= _END * tip.omega[-1]], axis=0)
     matters = 0.5 * end / (4.0 * _USUAL_DAMPING) >= _CRITICAL * -np.minimum(real.min(axis=0), 0.0)
     return np.where(matters & (end > 0.0), end, 0.0)
+
+
+def _drifts(tip: Receptance) -> FloatArray:
+    """Frequency [rad/s] of X and Y up to which a receptance is what an accelerometer's drift leaves, 0 where that cannot matter.
+
+    Below its first mode a structure is a spring: its receptance is positive and rises with frequency. Drift over the square of the
+    frequency is largest at the first lines. What counts as the first mode stands out of the accelerance, in which drift is flat.
+    """
+    found = np.zeros(len(tip.rows))
+    for k, values in enumerate(np.einsum("nii->in", tip.values)):
+        accelerance = tip.omega**2 * np.abs(values)
+        first = int(np.argmax(accelerance >= _STANDS_OUT * accelerance.max()))
+        below = values[:first]
+        if below.size < _FEWEST or np.argmax(np.abs(below)) >= _FIRST:
+            continue
+        negative = np.flatnonzero(below.real < _MATTERS * min(values[first:].real.min(), 0.0))
+        if negative.size:
+            found[k] = tip.omega[negative[-1]]
+    return found
 
 
 def measured_tip(

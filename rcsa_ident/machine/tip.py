@@ -209,11 +209,12 @@ class PlaneHolder:
 
     def at(self, places: Places) -> PlaneHolder:
         """Return the same at some of the frequencies."""
-        return PlaneHolder(self.tip_tip[places], self.flange[:, places], self.carried[:, places])
+        # laid out in memory as the whole ones are: one compiled kernel for both
+        return PlaneHolder(self.tip_tip[places], *(np.ascontiguousarray(each[:, places]) for each in (self.flange, self.carried)))
 
     def tip(self, w: ComplexArray) -> ComplexArray:
         """Return C11 for W, shape (..., n, 2, 2) -> (..., n, 1, 1), at this holder's frequencies."""
-        rows = np.ascontiguousarray(_planes(w))
+        rows = np.ascontiguousarray(_planes(w), dtype=complex)
         found: ComplexArray = tips_over(self.tip_tip, self.flange, self.carried, rows.reshape(-1, *rows.shape[-2:]))
         return found.reshape(*w.shape[:-2], 1, 1)
 

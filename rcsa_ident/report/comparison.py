@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
@@ -15,6 +16,9 @@ from rcsa_ident.report.figures import _STYLE, COLOURS
 
 _HAMMER = "#1f2933"
 _FORCE_COLOURS = ("#0072B2", "#C8501A", "#009E73")
+
+#: What is drawn of an FRF.
+_View = Callable[[ComplexArray], FloatArray]
 
 
 def save(figure: Figure, path: str | Path) -> None:
@@ -148,7 +152,7 @@ def frf_comparison(
     return figure
 
 
-def _views(real_and_imaginary: bool):
+def _views(real_and_imaginary: bool) -> tuple[_View, _View]:
     if real_and_imaginary:
         return (lambda h: 1e6 * h.real), (lambda h: 1e6 * h.imag)
 
@@ -177,14 +181,14 @@ def _band(column: np.ndarray, pair: FrfPair, real_and_imaginary: bool) -> None:
     column[0].fill_between(pair.frequency, 1e6 * low, 1e6 * (np.abs(h) + 2 * std), color=colour, alpha=0.25, lw=0, label="± 2 σ")
 
 
-def _peaks(ax, pair: FrfPair, view) -> None:
+def _peaks(ax: Axes, pair: FrfPair, view: _View) -> None:
     for measured, identified in pair.peaks:
         ax.plot(measured, np.interp(measured, pair.hammer_frequency, view(pair.hammer)), "v", ms=6.0, color=_HAMMER)
         if identified is not None:
             ax.plot(identified, np.interp(identified, pair.frequency, view(pair.identified)), "^", ms=6.0, color=COLOURS[pair.colour])
 
 
-def _shade(ax, band_hz: tuple[float, float], frequencies: Sequence[FloatArray]) -> None:
+def _shade(ax: Axes, band_hz: tuple[float, float], frequencies: Sequence[FloatArray]) -> None:
     low, high = min(f.min() for f in frequencies), max(f.max() for f in frequencies)
     for a, b in ((low, band_hz[0]), (band_hz[1], high)):
         if b > a:

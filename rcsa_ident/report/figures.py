@@ -115,12 +115,14 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
             order = order[np.argsort(omega[order])]
             frequency = to_hz(omega[order])
             top, bottom = grid[:, column]
-            for ax, curve in ((top, lambda h: 1e6 * np.abs(h)), (bottom, lambda h: np.degrees(np.angle(h)))):
-                ax.plot(frequency, curve(value[order]), "o", ms=3.4, mfc="none", mec=COLOURS[name], mew=1.0, zorder=3, label="measured")
-                if ax is bottom:
-                    ax.plot(frequency, _without_jumps(curve(model[order])), color=_TRUTH, lw=1.0, zorder=2, label="fitted")
-                else:
-                    ax.plot(frequency, curve(model[order]), color=_TRUTH, lw=1.0, zorder=2, label="fitted")
+            points, line = value[order], model[order]
+            pairs = (
+                (top, 1e6 * np.abs(points), 1e6 * np.abs(line)),
+                (bottom, np.degrees(np.angle(points)), _without_jumps(np.degrees(np.angle(line)))),
+            )
+            for ax, measured, fitted in pairs:
+                ax.plot(frequency, measured, "o", ms=3.4, mfc="none", mec=COLOURS[name], mew=1.0, zorder=3, label="measured")
+                ax.plot(frequency, fitted, color=_TRUTH, lw=1.0, zorder=2, label="fitted")
         _size_over_phase(grid, "|C31|  [µm/N]", [f"{name}: {each}" for each in names])
     return figure
 

@@ -38,7 +38,11 @@ def order_sums(samples, step, highest):
                 real[c, m] += x * cosine[m]
             for m in range(highest + 1):
                 imaginary[c, m] -= x * sine[m]
-    return (real + 1j * imaginary).T.copy()
+    sums = np.empty((highest + 1, channels), dtype=np.complex128)
+    for m in range(highest + 1):
+        for c in range(channels):
+            sums[m, c] = complex(real[c, m], imaginary[c, m])
+    return sums
 
 
 @numba.njit(cache=True, inline="always")

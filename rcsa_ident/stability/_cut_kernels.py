@@ -341,8 +341,17 @@ def lay_out(rows, forms, rubbing, plan, table):
     -------
     CutLayout
     """
-    rows, forms, rubbing = rows.copy(), plan.share * forms, plan.share * rubbing
-    rows[:, 3:5] *= plan.share
+    rows, forms, rubbing = rows.copy(), forms.copy(), rubbing.copy()
+    # loops: products of whole arrays take seconds to compile
+    for w in range(rows.shape[0]):
+        rows[w, 3] *= plan.share
+        rows[w, 4] *= plan.share
+    for pushes in (forms, rubbing):
+        for w in range(pushes.shape[0]):
+            for k in range(5):
+                for a in range(pushes.shape[2]):
+                    for b in range(pushes.shape[2]):
+                        pushes[w, k, a, b] *= plan.share
     places, points = elements(rows, plan, table.shape[1] - 1)
     stiffness, damping, angle, time = coefficients(rows, forms, rubbing, plan, places, points, table)
     where, weight = lookups(plan, places, points, angle, time, table, stiffness)

@@ -121,7 +121,9 @@ def _many(matrix, values):
         angle = 2.0 * math.pi * (k + 0.3) / r
         values[k] = radius * complex(math.cos(angle), math.sin(angle))
     if not _roots(polynomial, values):
-        values[:] = np.linalg.eigvals(matrix)
+        found = np.linalg.eigvals(matrix)
+        for k in range(found.size):
+            values[k] = found[k]
 
 
 @numba.njit(cache=True)

@@ -153,7 +153,7 @@ class TurningToolHolder:
         force[m:] = self.ports[:, 1:].T
         pole, right = np.linalg.eig(state)
         outputs, inputs = self.ports[:, 1:] @ right[:m], np.linalg.solve(right, force)
-        values = pole_sum(frozen(omega), pole, np.ascontiguousarray(outputs[rows].T * inputs[:, columns])).T
+        values = pole_sum(frozen(omega), frozen(pole, complex), np.ascontiguousarray(outputs[rows].T * inputs[:, columns])).T
         return values - np.outer(self.ports[rows, 0] * self.ports[columns, 0], 1.0 / omega**2)
 
 

@@ -376,17 +376,16 @@ def sweep_upright(segs, counts, lattice, places, moves, outline, peak, been, tol
         move = places[i : i + 2]
         level = move[0, 2] == move[1, 2]
         if level or (move[0, 0] == move[1, 0] and move[0, 1] == move[1, 1]):
-            if not _cut_across(segs[0], counts[0], 0, lattice, move, outline, been and level, told[i]):
-                return i
-            if not _cut_across(segs[1], counts[1], 1, lattice, move, outline, been and level, told[i]):
-                return i
+            # a place in a tuple that is written as a number would be compiled for each number
+            for along in range(2):
+                if not _cut_across(segs[along], counts[along], along, lattice, move, outline, been and level, told[i]):
+                    return i
             if not _cut_down(segs[2], counts[2], lattice, move, outline, peak, been and level, told[i]):
                 return i
         else:
-            if not _ramp_across(segs[0], counts[0], 0, lattice, move, outline, told[i]):
-                return i
-            if not _ramp_across(segs[1], counts[1], 1, lattice, move, outline, told[i]):
-                return i
+            for along in range(2):
+                if not _ramp_across(segs[along], counts[along], along, lattice, move, outline, told[i]):
+                    return i
             if not _ramp_down(segs[2], counts[2], lattice, move, outline, peak, told[i]):
                 return i
         been = True
@@ -471,7 +470,9 @@ def cut_leaning(seg, count, axes, lattice, frames, tips, outline, told):
     end = min(math.floor((box[0, 1] - origin[one]) / cell[one]), seg.shape[0] - 1)
     first = max(math.ceil((box[1, 0] - origin[two]) / cell[two]), 0)
     last = min(math.floor((box[1, 1] - origin[two]) / cell[two]), seg.shape[1] - 1)
-    far = np.max(outline[1])
+    far = 0.0
+    for k in range(outline.shape[1]):
+        far = max(far, outline[1, k])
     start = np.zeros(3)
     for m in range(begin, end + 1):
         for n in range(first, last + 1):

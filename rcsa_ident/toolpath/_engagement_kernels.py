@@ -343,9 +343,10 @@ def leaning_arcs(segs, counts, lattice, centre, frame, radius, feed, slope, arcs
     cell = min(lattice[1, 0], lattice[1, 1], lattice[1, 2])
     number = min(max(int(4.0 * math.pi * radius / cell), 24), 1440)
     # not at the angles of grazing
-    angle = (np.arange(number) + 0.5) * (2.0 * math.pi / number) - math.pi
-    away = np.empty(number)
+    angle, away, steep = np.empty(number), np.empty(number), slope * feed[1]
+    inside, facing, some = np.empty(number, dtype=np.bool_), np.empty(number, dtype=np.bool_), False
     for n in range(number):
+        angle[n] = (n + 0.5) * (2.0 * math.pi / number) - math.pi
         sine, cosine = radius * math.sin(angle[n]), radius * math.cos(angle[n])
         away[n] = distance_at(
             segs,
@@ -355,11 +356,10 @@ def leaning_arcs(segs, counts, lattice, centre, frame, radius, feed, slope, arcs
             centre[1] + sine * frame[1, 0] + cosine * frame[1, 1],
             centre[2] + sine * frame[2, 0] + cosine * frame[2, 1],
         )
-    inside = away > 0.0
-    if not np.any(inside):
+        inside[n], facing[n] = away[n] > 0.0, math.sin(angle[n]) * feed[0] > steep
+        some = some or inside[n]
+    if not some:
         return 0
-    steep = slope * feed[1]
-    facing = np.sin(angle) * feed[0] > steep
     graze = np.full(2, np.nan)
     if feed[0] > abs(steep):
         graze[0] = math.asin(steep / feed[0])
@@ -466,7 +466,8 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, most, rows,
             end = _end_beside(segs[2], counts[2], lattice, z, circle, frame, arcs, found, 0)
             extent[0] = (end if end > z - step else z - 0.5 * step) - tip if max(z - step, end) > tip else 0.0
         top, last_found, last_radius = z, found, radius
-        last_arcs[:found] = arcs[:found]
+        for each in range(found):
+            last_arcs[each, 0], last_arcs[each, 1] = arcs[each, 0], arcs[each, 1]
     if held:
         circle[2] = last_radius
         end = _end_beside(segs[2], counts[2], lattice, top, circle, frame, last_arcs, last_found, 1)

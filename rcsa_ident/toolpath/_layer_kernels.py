@@ -16,7 +16,10 @@ def material_ahead(seg, count, lattice, tip, outline, edge):
     """
     origin, cell = lattice[0], lattice[1]
     beside = max(cell[0], cell[1])
-    radius = np.max(outline[1]) + beside
+    radius = 0.0
+    for p in range(outline.shape[1]):
+        radius = max(radius, outline[1, p])
+    radius += beside
     low, high = np.inf, -np.inf
     first = max(math.ceil((tip[0] - radius - origin[0]) / cell[0]), 0)
     last = min(math.floor((tip[0] + radius - origin[0]) / cell[0]), seg.shape[0] - 1)

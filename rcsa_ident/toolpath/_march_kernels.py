@@ -127,7 +127,8 @@ def place_edge(walls, start, spacing, x, y, centre, swept, trail, held):
     if count == trail.shape[0]:
         # longer than half a turn: what is oldest has been swept
         erase(walls[1], start, spacing, trail[0, 0], -trail[0, 1], trail[1, 0], -trail[1, 1])
-        trail[:-1] = trail[1:]
+        for i in range(1, count):
+            trail[i - 1, 0], trail[i - 1, 1] = trail[i, 0], trail[i, 1]
         count -= 1
     trail[count, 0], trail[count, 1] = x, y
     if count > 0 and min(trail[count - 1, 1], y) < centre:
@@ -138,7 +139,7 @@ def place_edge(walls, start, spacing, x, y, centre, swept, trail, held):
             erase(walls[1], start, spacing, trail[done, 0], -trail[done, 1], trail[done + 1, 0], -trail[done + 1, 1])
         done += 1
     for i in range(done, count + 1):
-        trail[i - done] = trail[i]
+        trail[i - done, 0], trail[i - done, 1] = trail[i, 0], trail[i, 1]
     held[0] = count - done + 1
 
 
@@ -191,23 +192,30 @@ def march(springs, swings, going, teeth, columns, course, step, solved, forces, 
     ports = 3 + loose.size
     # answers of deflections to the force on the tip, and to the springs that a play lets go
     drive = np.zeros((n, ports))
-    drive[:, :3] = motion.T
+    for i in range(n):
+        for d in range(3):
+            drive[i, d] = motion[d, i]
     for p in range(loose.size):
         drive[loose[p], 3 + p] = stiffness[loose[p]]
     answer = inverse @ drive
-    port = np.zeros((ports, ports))
-    port[:3] = quarter * (motion @ answer)
-    port[3:] = quarter * answer[loose]
+    port, moves = np.zeros((ports, ports)), motion @ answer
+    for b in range(ports):
+        for a in range(3):
+            port[a, b] = quarter * moves[a, b]
+        for p in range(loose.size):
+            port[3 + p, b] = quarter * answer[loose[p], b]
     for m in range(factor.size):
         for a in range(3):
             for b in range(3):
                 port[a, b] += 2.0 * (outputs[a, m] * late[m] * inputs[m, b]).real
-    port[:3, :3] += constant
+    for a in range(3):
+        for b in range(3):
+            port[a, b] += constant[a, b]
     turned, chips = np.empty((count, levels, 2)), np.zeros((count, levels))
     place, rate, gain, right = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     there, now, acts, force = np.empty(ports), np.empty(ports), np.zeros(ports), np.zeros(3)
-    acts[:3] = before
-    force[:] = before
+    for d in range(3):
+        acts[d] = force[d] = before[d]
     failed = 0
     for t in range(course.shape[0]):
         angle, x, y = course[t]
@@ -280,5 +288,6 @@ def march(springs, swings, going, teeth, columns, course, step, solved, forces, 
                 swept = x + now[0] + (radius - chips[j, k]) * turned[j, k, 0] if turned[j, k, 1] > 0.0 else np.inf
                 ex, ey = x + now[0] + radius * turned[j, k, 0], y + now[1] + radius * turned[j, k, 1]
                 place_edge(columns.tops[:, k], columns.start, columns.spacing, ex, ey, y + now[1], swept, trail[j, k], held[j : j + 1, k])
-    before[:] = force
+    for d in range(3):
+        before[d] = force[d]
     return failed

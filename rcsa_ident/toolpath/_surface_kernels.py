@@ -165,7 +165,12 @@ def _nearest_to_planes(square, right, mean, low, step, vertex):
     for a in range(3):
         square[a, a] += 0.05
     one, two, three = square[0], square[1], square[2]
-    first, second, third = np.cross(two, three), np.cross(three, one), np.cross(one, two)
+    first, second, third = np.empty(3), np.empty(3), np.empty(3)
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        first[a] = two[b] * three[c] - two[c] * three[b]
+        second[a] = three[b] * one[c] - three[c] * one[b]
+        third[a] = one[b] * two[c] - one[c] * two[b]
     determinant = one[0] * first[0] + one[1] * first[1] + one[2] * first[2]
     for a in range(3):
         moved = mean[a] + (first[a] * right[0] + second[a] * right[1] + third[a] * right[2]) / determinant

@@ -165,13 +165,6 @@ class Walls:
         """Of the columns, shape (n,) [m]."""
         return self.start + self.spacing * np.arange(self.tops.shape[-1])
 
-    def top_at(self, x: float) -> FloatArray:
-        """Return the column nearest to a place, shape (2, slices) [m]."""
-        i = round((x - self.start) / self.spacing)
-        if not 0 <= i < self.tops.shape[-1]:
-            raise InputError("x", x, f"a place between {self.start:g} and {self.x[-1]:g} m")
-        return self.tops[:, :, i]
-
     def copy(self) -> Walls:
         """Return walls of their own."""
         return Walls(self.start, self.spacing, self.tops.copy(), self.feet)

@@ -103,12 +103,16 @@ def mill(decay, gain, shape, state, teeth, ahead, cut, turn, course, force):
     outputs = shape.shape[1]
     result = np.zeros((n, outputs))
     # the tool's place along feed and normal, and its way without vibration
-    path = np.zeros((n, 3))
-    path[:, 2] = course[:, 1]
-    angle = course[:, 0].copy()
+    path, angle = np.zeros((n, 3)), np.empty(n)
+    for i in range(n):
+        path[i, 2], angle[i] = course[i, 1], course[i, 0]
     before = course[1, 1] - course[0, 1]
-    places = -ahead / (angle[1] - angle[0])
-    now = cut.copy()
+    places, now = np.empty_like(ahead), np.empty_like(cut)
+    for j in range(ahead.shape[0]):
+        for k in range(ahead.shape[1]):
+            places[j, k] = -ahead[j, k] / (angle[1] - angle[0])
+    for k in range(1, cut.size):
+        now[k] = cut[k]
     local = np.zeros(3)
     position = np.zeros(2)
     inputs = gain.shape[3]

@@ -295,12 +295,13 @@ def directional_matrices(cutter: Cutter, conditions: CuttingConditions, coeffici
 
 
 #: Integrals of sin cos, sin^2, cos^2, and theirs.
-_PRIMITIVES = (
+_Primitives = tuple[Callable[[FloatArray | float], FloatArray], ...]
+_PRIMITIVES: _Primitives = (
     lambda p: -0.25 * np.cos(2.0 * p),
     lambda p: 0.5 * p - 0.25 * np.sin(2.0 * p),
     lambda p: 0.5 * p + 0.25 * np.sin(2.0 * p),
 )
-_SECOND_PRIMITIVES = (
+_SECOND_PRIMITIVES: _Primitives = (
     lambda p: -0.125 * np.sin(2.0 * p),
     lambda p: 0.25 * p**2 + 0.125 * np.cos(2.0 * p),
     lambda p: 0.25 * p**2 - 0.125 * np.cos(2.0 * p),

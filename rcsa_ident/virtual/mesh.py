@@ -10,10 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse
+from numpy.typing import NDArray
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
-from rcsa_ident.tool_holder.timoshenko import beam_matrices, layer_matrices, section
+from rcsa_ident.tool_holder.timoshenko import Section, beam_matrices, layer_matrices, section
 
 #: Elements per outer diameter, and the least number in a stretch between two steps, straight or tapered.
 ELEMENTS_PER_DIAMETER = 8.0
@@ -22,6 +24,9 @@ LEAST_ON_TAPER = 16
 
 #: Bodies, as nodes are told apart.
 TOOL, HOLDER, SHAFT = 0, 1, 2
+
+#: Freedoms, and a matrix over them.
+_Part = tuple[NDArray[np.intp], FloatArray]
 
 
 def nanometres(z: float) -> int:
@@ -36,12 +41,12 @@ class Mesh:
         self.count = 0
         self.nodes: dict[tuple[int, int], int] = {}
         self.flange = -1
-        self.beams: dict[tuple[int, int], tuple] = {}
-        self.mass: list = []
-        self.stiffness: list = []
-        self.loss: list = []
-        self.rotary: list = []
-        self.damping: list = []
+        self.beams: dict[tuple[int, int], tuple[Section, float, NDArray[np.intp]]] = {}
+        self.mass: list[_Part] = []
+        self.stiffness: list[_Part] = []
+        self.loss: list[_Part] = []
+        self.rotary: list[_Part] = []
+        self.damping: list[_Part] = []
 
     def new_node(self) -> int:
         """Return the number of one more node."""
@@ -82,7 +87,7 @@ class Mesh:
             self.beams[number, a] = (beam, end - start, index)
 
     @staticmethod
-    def sum(parts: list, freedoms: int) -> scipy.sparse.csc_array:
+    def sum(parts: list[_Part], freedoms: int) -> scipy.sparse.csc_array:
         """Add up matrices given with the freedoms that they belong to."""
         if not parts:
             return scipy.sparse.csc_array((freedoms, freedoms))

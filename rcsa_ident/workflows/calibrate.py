@@ -152,7 +152,7 @@ def measure_force(
     return MeasuredForce(cut_id, record, inside.shape[0] / rate, zero is not None)
 
 
-def _forces(recording: Recording, cut_id: str) -> tuple[FloatArray, list]:
+def _forces(recording: Recording, cut_id: str) -> tuple[FloatArray, list[Sensor]]:
     found = [recording.channel(Quantity.FORCE, axis) for axis in (Dof.X, Dof.Y, Dof.Z)]
     missing = [axis.upper() for axis, f in zip((Dof.X, Dof.Y), found, strict=False) if f is None]
     if missing:

@@ -1,8 +1,14 @@
-"""Small jobs that call every kernel in the signatures that the commands use, so that all are compiled and cached."""
+"""Small jobs that call every kernel in the signatures that the commands use, so that all are compiled and cached.
+
+Several processes may do them at once. numba's cache survives two of them that compile the same kernel for the same types; for different
+types one's code might end under the other's name. So the steps whose kernels others call come first, and of the rest those that call
+kernels of the same file stay in one process.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -75,6 +81,10 @@ def _assembly() -> ToolAssembly:
 
 def _tool_holder() -> None:
     tool_holder_receptance(_assembly(), 2.0 * np.pi * np.linspace(100.0, 2000.0, 20))
+
+
+def _force_lines() -> None:
+    force_and_slope(_CUTTER, _CONDITIONS, _COEFFICIENTS, 2 * np.arange(1, 6))
 
 
 def _recordings() -> None:
@@ -218,11 +228,12 @@ def _virtual_machine() -> None:
 #: Name and job, in the order of the chain.
 STEPS: dict[str, Callable[[], None]] = {
     "tool-holder": _tool_holder,
+    "force lines": _force_lines,
+    "tips": _tips,
     "recordings": _recordings,
     "listening": _listening,
     "default method": _default_method,
     "paper's method": _paper_method,
-    "tips": _tips,
     "lobes": _lobes,
     "lobes in time": _lobes_in_time,
     "robot": _robot,
@@ -231,3 +242,26 @@ STEPS: dict[str, Callable[[], None]] = {
     "force observer": _observer,
     "virtual machine": _virtual_machine,
 }
+#: What must be done before the rest.
+FIRST = ("tool-holder", "force lines", "tips")
+#: The rest, by process, longest first.
+TOGETHER = (
+    ("material removal", "milling in time"),
+    ("lobes in time",),
+    ("default method", "paper's method"),
+    ("lobes",),
+    ("recordings", "listening"),
+    ("robot",),
+    ("force observer",),
+    ("virtual machine",),
+)
+
+
+def compile_steps(names: Sequence[str]) -> dict[str, float]:
+    """Do steps one after the other and return how long each took [s]."""
+    taken = {}
+    for name in names:
+        start = time.perf_counter()
+        STEPS[name]()
+        taken[name] = time.perf_counter() - start
+    return taken

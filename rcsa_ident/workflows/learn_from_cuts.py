@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machining_setup import CutSpec, Tooling
+from rcsa_ident.scaleout import Map
 from rcsa_ident.stability.label_posterior import Effort, LabelModel, learn_labels
 from rcsa_ident.stability.lobes import both_directions
 from rcsa_ident.stability.methods import StabilityMethod
@@ -39,8 +38,6 @@ _TASK = 20
 _MOST_SPEEDS, _DEPTHS = 40, 12
 #: Share of the posterior's spread that its modes may miss without a word.
 _MISSED = 0.1
-
-Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks import labelled_cuts
-from benchmarks.labelled_cuts import CUTS, TRAINING, Pool, Score, limits_of, read, scores_after, unseen
+from benchmarks.label_scores import Score
+from benchmarks.labelled_cuts import CUTS, TRAINING, Pool, limits_of, read, scores_after, unseen
 from rcsa_ident.stability.label_posterior import LabelModel
 from rcsa_ident.stability.tested_cuts import Verdict
 from tests.fixtures.paths import ROOT

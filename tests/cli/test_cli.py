@@ -48,6 +48,19 @@ def test_help_imports_nothing_heavy():
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
+def test_lobes_without_a_picture_import_nothing_that_draws(tmp_path, result_file, tooling_file):
+    asked = ["lobes", str(result_file), str(tooling_file), "--out", str(tmp_path / "L.csv"), "--speed-from", "8000", "--speed-to", "8100"]
+    code = (
+        f"import sys; from rcsa_ident.cli import app\ntry: app({asked!r})\nexcept SystemExit: pass\n"
+        "heavy = {'matplotlib', 'pymoo', 'scipy.signal', 'scipy.stats', 'h5py'} & set(sys.modules)\n"
+        "raise SystemExit(str(heavy) if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=dict(os.environ), check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "L.csv").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -132,6 +132,7 @@ def test_a_file_comes_back_as_it_was(shop, learnt):
     assert found.cuts.verdict == (Verdict.STABLE, Verdict.CHATTER, Verdict.STABLE, Verdict.STABLE)
     assert found.prior.size == 8
     data = learnt_tip_to_json(found)
+    ragged = [data["prior"]["modes"][0], {**data["prior"]["modes"][1], "outputs": [[1.0, 0.0]]}]
     for change, words in (
         ({"schema_version": 7}, "schema_version: found 7"),
         ({"kind": "result"}, "kind"),
@@ -140,6 +141,8 @@ def test_a_file_comes_back_as_it_was(shop, learnt):
         ({"posterior": {**data["posterior"], "errors": [[1.0], [2.0, 3.0]]}}, "posterior.errors: found rows that differ"),
         ({"labels": {**data["labels"], "noise": {**data["labels"]["noise"], "width": -1.0}}}, "labels.noise.width: found -1"),
         ({"prior": {**data["prior"], "root": [[1.0]]}}, "prior.root"),
+        ({"prior": {**data["prior"], "root": [[10**400]]}}, "prior.root: found rows that differ, or no numbers"),
+        ({"prior": {**data["prior"], "modes": ragged}}, r"prior.modes\[1\].outputs: found 1 rows, allowed is as many as of the first"),
     ):
         with pytest.raises(ValueError, match=words):
             learnt_tip_of(data | change, "L.json")

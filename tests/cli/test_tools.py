@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from rcsa_ident.cli import app as whole
 from rcsa_ident.cli import tools
 from rcsa_ident.io.setups import read_tooling
 from tests.fixtures.tool_library import END_MILL, end_mill, library
@@ -116,6 +117,8 @@ def test_a_drawing_is_written(tmp_path):
 
 def test_a_holder_of_the_catalogue_is_printed_as_a_tooling_takes_it(tmp_path):
     assert "HSK-A63" in run("holders").output
+    # brackets are no markup of the terminal's
+    assert "[holder] and [contact]" in CliRunner().invoke(whole, ["holders", "--help"]).output
     text = run("holders", "HSK-A63", "ER32", "--bore-mm", 12).output
     assert text.startswith("# HSK-A63 ER32, bore 12 mm, 100 mm, 1.54 kg")
     assert "[holder]" in text

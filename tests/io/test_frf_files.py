@@ -216,6 +216,16 @@ def test_text_that_is_not_read(tmp_path, text, words):
     assert words in str(caught.value)
 
 
+def test_lines_below_a_frequency_are_left_out(tmp_path):
+    path = tmp_path / "tip.frf"
+    path.write_text("".join(f"{f} {f * 1e-9} 0\n" for f in (10, 20, 30, 40)))
+    frequency, values = read_tap_tests([Source(path, ("X", "X"))], from_hz=20.0)["X", "X"]
+    np.testing.assert_array_equal(frequency, [20.0, 30.0, 40.0])
+    np.testing.assert_allclose(values, [20e-9, 30e-9, 40e-9], rtol=1e-15)
+    with pytest.raises(InputError, match="frf_from_hz: found 35, allowed is a frequency below the last, 40 Hz"):
+        read_tap_tests([Source(path, ("X", "X"))], from_hz=35.0)
+
+
 def test_the_face_mill(tmp_path):
     paths = {axis: SHARED / f"facemill_{axis}.frf" for axis in "xy"}
     if not all(path.exists() for path in paths.values()):

@@ -14,7 +14,9 @@ from tests.fixtures.paths import ROOT
 
 #: What hangs on another key of the file, or asks for one more key or entry: only a reader knows it.
 _BETWEEN_KEYS = re.compile(
-    r"finite numbers? \[deg\]|angles above 0 that add up|on a tool that is|above entry_angle_deg|at most half of the diameter|"
+    r"finite numbers? \[(deg|mm|wavelengths)\]|"
+    r"radial_depth_mm: found [\d.e+]+, allowed is a finite number above 0 and at most|the distance from the tip from 0 to|"
+    r"angles above 0 that add up|on a tool that is|above entry_angle_deg|at most half of the diameter|"
     r"a list of \d+ of them, one a tooth|an amplitude below the wavelength|offsets for the shape table|"
     r"(entry|exit)_angle_deg: found nothing|one way to tell the engagement|above y_from_mm|a block that the cutter reaches|"
     r"needs the map of its engagement|engagement map: found no such file|never fall \[m\]|0 <= start <= end|a cut in which some tooth cuts|"
@@ -126,3 +128,21 @@ def test_dialect_and_what_an_editor_shows():
     }
     assert schema["required"] == ["cutter", "tool", "holder"]
     assert "bull-nose" in schema["properties"]["cutter"]["properties"]["shape"]["enum"]
+
+
+def test_sizes_that_hang_on_teeth_and_tools_are_left_to_the_reader():
+    """A limit of the files that a schema is made of is none of the schema's own."""
+    _, read, files = _FILES["tooling"]
+    three = copy.deepcopy(files[0])
+    three["cutter"] |= {"teeth": 3, "runout_mm": [0.0, 0.01, 0.02], "axial_runout_mm": [0.0] * 3}
+    three["cutter"]["serration"] = {"amplitude_mm": 0.2, "wavelength_mm": 1.5, "shift": [0.0, 0.3, 0.6]}
+    three["holder"]["segments"][0] |= {"outer_diameter_mm": 80.0, "area_mm2": 3000.0, "second_moment_mm4": 9e5}
+    assert _refusal(read, three) is None
+    assert jsonschema_rs.validator_for(schema_of("tooling")).is_valid(three)
+    campaign = schema_of("campaign")["properties"]
+    assert "maximum" not in campaign["cuts"]["items"]["properties"]["radial_depth_mm"]
+    for key in ("response", "force"):
+        assert campaign["frfs"]["items"]["properties"][key]["anyOf"] == [
+            {"enum": ["tip", "flange"]},
+            {"type": "number", "minimum": 0.0, "description": "In mm"},
+        ]

@@ -46,6 +46,14 @@ def test_a_preamble_and_units_are_read(tmp_path, shape, encoding):
     np.testing.assert_allclose(recording.samples, FORCE, rtol=1e-6, atol=1e-6)
 
 
+def test_a_row_that_stands_above_the_table_by_itself_is_no_header_that_comes_again(tmp_path):
+    """Found by fuzzing: all rows were taken for headers, and none was left."""
+    path = tmp_path / "r.csv"
+    path.write_text("name\n1\t2\n\nnote\n1\t2\n1\t2\n2\t3\n")
+    found = open_recording(path, default_rate=1000.0)
+    assert [channel.samples.tolist() for channel in found.channels] == [[1.0, 1.0, 2.0], [2.0, 2.0, 3.0]]
+
+
 @pytest.mark.parametrize("time", [True, False])
 def test_of_several_measuring_cycles_the_first_is_read(tmp_path, time):
     """As DynoWare exports them, one below the other, their times beginning anew; said, on a campaign's recording as well."""

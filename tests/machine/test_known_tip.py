@@ -110,6 +110,19 @@ def test_a_measurement_that_ends_below_the_tools_own_mode_says_so(own_hz, flexib
     assert [remark.startswith("the receptance in Y ends at 2000 Hz with a real part of") for remark in found] == [True] * told
 
 
+@pytest.mark.parametrize(("low_hz", "drift", "told"), [(0.0, 3e-4, True), (0.0, 0.0, False), (0.0, 1e-9, False), (18.0, 0.0, False)])
+def test_drift_over_the_square_of_the_frequency_says_so(low_hz, drift, told):
+    # modes of a tip, beside them the slow and soft mode of an arm, or an acceleration [m/s^2/N] that nobody made
+    frequency = np.arange(2.0, 3001.0, 2.0)
+    omega = 2.0 * np.pi * frequency
+    modes = ((900.0, 1e7), (1900.0, 8e6), (low_hz, 3e6))
+    values = sum(1.0 / (k * (1.0 - (frequency / f) ** 2 + 0.06j * frequency / f)) for f, k in modes if f)
+    found = KnownTip(measured_tip({Dof.X: (frequency, values - drift / omega**2)})).remarks
+    assert [remark.startswith("the receptance in X falls from its first line on and is negative up to 4 Hz") for remark in found] == [
+        True
+    ] * told
+
+
 def test_modes_of_a_tip_stay_modes():
     model = normal_modes(np.array([5000.0]), np.array([0.01]), np.ones((1, 1)), (Coordinate("tip", Dof.Y),))
     modes = TipModes.of({Dof.Y: model})

@@ -30,3 +30,15 @@ def test_receptances_and_slopes_are_those_of_solved_systems(count, columns):
             change = dk - w**2 * dm + 1j * (ds + w * dc)
             expected = [-x[:, a] @ change @ x[:, b] for a, b in pairs]
             np.testing.assert_allclose(slopes[f, :, u], expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())
+
+
+def test_without_room_for_slopes_all_values_come_all_the_same():
+    """More frequencies than lanes: those behind the first ones, too."""
+    rng = np.random.default_rng(1)
+    count = 2 * kernels.LANES + 3
+    matrices = np.array([np.eye(2), 30.0 * np.eye(2), 1e6 * np.eye(2), 1e4 * np.eye(2)])
+    loads, omega = rng.standard_normal((3, 2)), np.linspace(300.0, 3000.0, count)
+    values = np.full((count, 6), np.nan, dtype=complex)
+    kernels.reduced_receptances(matrices, loads, omega, np.ones((1, 4, 2, 2)), values, np.empty((0, 6, 1), dtype=complex))
+    dynamic = 1e6 - omega**2 + 1j * (1e4 + 30.0 * omega)
+    np.testing.assert_allclose(values[:, 5], loads[2] @ loads[2] / dynamic, rtol=1e-12)

@@ -215,7 +215,8 @@ def point_torques(turn, offset, axis, angles, rate, acceleration, gravity, link,
         frames(turn, offset, axis, angles[t], rotation, origin, direction)
         for p in range(link.size):
             mass[link[p]] = 1.0
-            centre[link[p]] = place[p]
+            for i in range(3):
+                centre[link[p], i] = place[p, i]
             inverse_dynamics(rotation, origin, direction, mass, centre, inertia, rate[t], acceleration[t], gravity, torque)
             mass[link[p]] = 0.0
             for k in range(n):
