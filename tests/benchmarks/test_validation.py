@@ -24,6 +24,7 @@ def test_the_page_is_what_its_rows_give():
 
 
 def test_every_case_has_its_row():
+    assert [case.name for _, case in cases()] == list(ALL)  # no name stands twice
     assert list(ROWS) == list(ALL)
     for name, row in ROWS.items():
         group, case = ALL[name]
