@@ -180,22 +180,24 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--only", metavar="NAME", help="only cases whose group or name holds this; the page's other rows stay")
     parser.add_argument("--reuse", type=Path, metavar="FILE.jsonl", help="rows that are not measured again")
     given = parser.parse_args(arguments)
-    kept = {} if given.out is None else {row["name"]: row for row in read_rows(given.out.with_suffix(".jsonl"))}
-    reused = {} if given.reuse is None else {row["name"]: row for row in read_rows(given.reuse)}
-    commit, rows = head(), []
-    for group, case in cases():
+    path = None if given.out is None else given.out.with_suffix(".jsonl")
+    rows = {row["name"]: row for each in (path, given.reuse) if each is not None for row in read_rows(each)}
+    reused = set() if given.reuse is None else {row["name"] for row in read_rows(given.reuse)}
+    commit, every = head(), list(cases())
+    for group, case in every:
         asked = given.only is None or given.only.lower() in f"{group} {case.name}".lower()
-        if asked and there(case) and case.name not in reused:
-            row = measured(group, case, commit_of(case, commit))
-            said = "" if row["holds"] else "  MORE THAN ALLOWED"
-            allowed = "" if case.tolerance is None else f" ({case.tolerance:g} allowed)"
-            print(f"{case.name}: {row['error']:.2g} {case.measure}{allowed}, {row['seconds']} s{said}", flush=True)
-        else:
-            row = reused.get(case.name) or kept.get(case.name)
-        if row is not None:
-            rows.append(row)
-    if given.out is not None:
+        if not asked or not there(case) or case.name in reused:
+            continue
+        row = rows[case.name] = measured(group, case, commit_of(case, commit))
+        said = "" if row["holds"] else "  MORE THAN ALLOWED"
+        allowed = "" if case.tolerance is None else f" ({case.tolerance:g} allowed)"
+        print(f"{case.name}: {row['error']:.2g} {case.measure}{allowed}, {row['seconds']} s{said}", flush=True)
+        if path is not None:
+            # whatever interrupts the rest
+            write_rows(path, [rows[each.name] for _, each in every if each.name in rows])
+    if path is not None:
         from benchmarks.validation_page import page
 
-        write_rows(given.out.with_suffix(".jsonl"), rows)
-        given.out.write_text(page(rows), encoding="utf-8")
+        found = [rows[each.name] for _, each in every if each.name in rows]
+        write_rows(path, found)
+        given.out.write_text(page(found), encoding="utf-8")

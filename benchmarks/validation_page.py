@@ -11,8 +11,8 @@ from benchmarks.validation_missed import WORDS
 MISSED = "Not reproduced"
 HEAD = """# Validation
 
-Every published figure, closed form and public recording that the package is compared with, in one place. Written by
-`python -m benchmarks validation --out docs/validation.md` from [validation.jsonl](validation.jsonl), which holds all rows with all digits.
+Published figures, closed forms and public recordings beside what the package makes of them, in one place. Written by
+`python -m benchmarks validation --out docs/validation.md` from [validation.jsonl](validation.jsonl), which has more digits.
 `python -m benchmarks validation --only NAME` measures the rows whose name or group holds NAME; `--reuse docs/validation.jsonl` measures
 only what is missing there.
 

@@ -388,19 +388,6 @@ CASES = (
             ("largest Fx, smallest Fy", (2, 1), 0.05),
         )
     ),
-    *(
-        Case(
-            f"strongest peak of tooling 2 along Y, printed modes, φ_r {how}",
-            "[inprocess], the text: case 2 chatters at the mode near 2400 Hz",
-            2400.0,
-            partial(peak, sign),
-            "Hz",
-            allowed,
-            "python -m benchmarks published_modes",
-            slow=True,
-        )
-        for sign, how, allowed in ((-1, "negated", 0.05),)
-    ),
     Case(
         "cutting coefficients of three materials as the package ships them, K_tc and K_rc",
         "[duan2021], table 5; [du2023]; [huynh2018]",
