@@ -221,6 +221,7 @@ def test_units_and_records_of_tap_tests(shop):
     softer = read_lobes_csv(shop / "L.csv").limit
     assert np.all(np.isnan(softer))
     assert "names no axis" in run(*base, "--frf", shop / "x.frf", code=2).stderr
+    assert "--frf-from-hz" in run(*base, "--frf", f"X={shop}/x.frf", "--frf-from-hz", 1e6, code=2).stderr
     tests = read_tap_tests([Source(shop / f"{a}.frf", (a.upper(), a.upper())) for a in "xy"])
     curves = {axis: values for (axis, _), (_, values) in tests.items()}
     write_frf_csv(shop / "F.csv", tests["X", "X"][0], curves)
