@@ -67,7 +67,7 @@ def compiled(steps: Sequence[str] | None) -> dict[str, Any]:
     # what runs, innermost last: kernel, phase, start, seconds of what runs inside
     running: list[list[Any]] = []
 
-    class Phase(event.Listener):  # type: ignore[misc]
+    class Phase(event.Listener):
         def on_start(self, told: event.Event) -> None:
             kernel, phase = running[-1][0] if running else None, "other passes"
             if told.kind == "numba:compile":

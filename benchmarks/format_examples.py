@@ -329,6 +329,13 @@ def _outputs(folder: Path) -> None:
     (folder / "FORCES.csv").write_text("\n".join(["time_s,Fx_n,Fy_n,Fx_std_n,Fy_std_n", *rows]) + "\n", encoding="utf-8")
     with tempfile.TemporaryDirectory() as scratch:
         (folder / "RESULT.json").write_text(result_text(Path(scratch)), encoding="utf-8")
+        # the first mode of each direction: a small file
+        first = TEXTS["MODES.toml"].split("[[")
+        modes = Path(scratch, "MODES.toml")
+        modes.write_text("[[".join([*first[:2], first[3]]) + "[coefficients]" + first[4].split("[coefficients]")[1], encoding="utf-8")
+        learn = ["learn", str(modes), "TOOLING.toml", "--tests", "CUTS.csv", "--immersion", "0.5", "--strategy", "down"]
+        command = [sys.executable, "-m", "rcsa_ident.cli", *learn, "--out", "LEARNT.json"]
+        subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
 def write(folder: Path) -> None:

@@ -62,7 +62,7 @@ def main(arguments: list[str]) -> None:
         if unknown := set(names) - set(TARGETS):
             parser.error(f"no such readers: {', '.join(sorted(unknown))}")
         if not given.blind and find_spec("atheris") is None:
-            parser.error("atheris is not installed: pip install atheris, or --blind")
+            parser.error("atheris is not installed: pip install 'atheris>=3,<4', or --blind")
         for round_ in range(given.rounds):
             for name in names:
                 _in_process(name, given, given.seed + round_)

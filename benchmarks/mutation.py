@@ -222,7 +222,7 @@ def _mutated(module: Any, mutant: Mutant, session: Any) -> bool:
     else:
         exec(code, fresh := dict(module.__dict__))
         for name, value in fresh.items():
-            if isinstance(value, int | float | tuple):
+            if not callable(value) and not name.startswith("__"):
                 setattr(module, name, value)
     return _failed(session)
 

@@ -190,7 +190,7 @@ CASES = (
     *(
         Case(
             f"118 labelled cuts told right by lobes of the published prior, {method}",
-            CUTS + ", authors' lobes",
+            CUTS + ", accurate lobes of that prior",
             73.7,
             partial(told_right, method),
             "%",

@@ -76,6 +76,8 @@ sphinx_gallery_conf = {
     "filename_pattern": r"\.py$",
     "ignore_pattern": r"^_",
     "download_all_examples": False,
+    "within_subsection_order": "ExampleTitleSortKey",
+    "reset_modules": ("matplotlib", "_ext.gallery_style.drawn_in_the_gallerys_style"),
     "plot_gallery": not tags.has("quick"),  # noqa: F821  # Sphinx puts it here
     "show_memory": False,
     "write_computation_times": False,  # a page that loads its tables' scripts from elsewhere

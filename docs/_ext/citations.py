@@ -33,8 +33,8 @@ def in_docstring(_app: Sphinx, _what: str, _name: str, _thing: object, _options:
 
 
 def in_page(_app: Sphinx, docname: str, source: list[str]) -> None:
-    """Leave code as it is: what stands between backticks, and fenced blocks."""
-    if docname == "references" or "[" not in source[0]:
+    """Leave code as it is, what stands between backticks and fenced blocks, and the gallery, which is no Markdown and cites by itself."""
+    if docname == "references" or docname.startswith("gallery/") or "[" not in source[0]:
         return
     parts = re.split(r"(^```.*?^```|^:::.*?^:::|`[^`\n]*`)", source[0], flags=re.DOTALL | re.MULTILINE)
     source[0] = "".join(part if i % 2 else CITED.sub(r"{cite}`\1`", part) for i, part in enumerate(parts))

@@ -54,7 +54,7 @@ QUICK = [
 ]
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow(0.2)
 @pytest.mark.parametrize("name", QUICK)
 def test_quick_cases_come_out_again(name):
     group, case = ALL[name]

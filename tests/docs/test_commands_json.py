@@ -67,3 +67,5 @@ def test_keys_of_a_result_are_told():
     axis = result["axes"]["X"]
     assert set(result) | set(result["campaign"]) | set(axis) | set(axis["joint"]) <= told
     assert set(axis["modes"][0]) | set(axis["covariance"]) | set(axis["misfit"]) <= told
+    learnt = json.loads((EXAMPLES / "LEARNT.json").read_text("utf-8"))
+    assert set(learnt) | set(learnt["prior"]) | set(learnt["posterior"]) <= told

@@ -16,6 +16,7 @@ from rcsa_ident.io.exports import TAP_SUFFIXES
 from rcsa_ident.io.flanges import read_flange_machine
 from rcsa_ident.io.forces import read_forces_csv
 from rcsa_ident.io.frf_files import read_frfs
+from rcsa_ident.io.learnt_tips import read_learnt_tip
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.meshes import MESHES, read_mesh
 from rcsa_ident.io.modes import read_modes_file
@@ -164,6 +165,13 @@ def test_tables():
     flange = read_flange_machine(EXAMPLES / "FLANGE.csv")
     assert [str(part.coordinates[0].dof) for part in flange.parts] == ["x", "y"]
     assert read_result(EXAMPLES / "RESULT.json")["status"] in ("converged", "suspect")
+
+
+def test_what_labels_have_taught():
+    learnt = read_learnt_tip(EXAMPLES / "LEARNT.json")
+    assert learnt.prior.modes.pole.size == 2
+    assert [str(verdict) for verdict in learnt.cuts.verdict] == ["stable", "chatter", "marginal", "stable"]
+    assert learnt.posterior.z.shape == (300, 8)
 
 
 def test_what_commands_write():

@@ -56,3 +56,31 @@ def test_what_is_not_plain_is_left_to_others(kernel, line):
 def test_what_would_end_a_line_elsewhere_is_seen_in_cells_that_are_passed_over(kernel, cell):
     assert rows(kernel, f"1,{cell},2\n", [0, -1, 1])[0] == -1
     assert rows(kernel, "1,a b#~,2\n", [0, -1, 1])[0] == 1
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("text", ["1:2,3\n", "1/2,3\n", "12:,3\n"])
+def test_signs_beside_the_digits_are_none(kernel, text):
+    """In ASCII a stroke stands in front of 0, a colon behind 9."""
+    assert rows(kernel, text, [0, 1])[0] == -1
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_a_line_that_holds_blanks_alone_is_no_row(kernel):
+    assert rows(kernel, " ,\n", [-1, 0])[0] == -1
+    count, values = rows(kernel, "x,\n", [-1, 0])
+    assert count == 1
+    assert np.isnan(values[0, 0])
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_powers_of_ten_that_are_not_exact_are_left_to_python(kernel):
+    """10^22 is the largest that a double holds; a product with the next one may be rounded twice."""
+    told = 0
+    for exponent in (22, -22, 23, -23, 24):
+        for whole in range(1, 400, 7):
+            count, values = rows(kernel, f"{whole}e{exponent}\n", [0])
+            if count == 1:
+                told += 1
+                assert values[0, 0] == float(f"{whole}e{exponent}")
+    assert told

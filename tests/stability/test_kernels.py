@@ -148,3 +148,45 @@ def test_receptance_at_any_frequency():
     w = np.linspace(1.1, uneven[-1] - 0.1, 30)
     power = (np.array([1.0, 0.5j]) * uneven[:, None] ** np.array([5, 3])).astype(complex)
     np.testing.assert_allclose(kernels.receptance_at(uneven, power, w), np.array([1.0, 0.5j]) * w[:, None] ** np.array([5, 3]), rtol=1e-9)
+
+
+def test_phases_go_on_within_an_interval(characteristic):
+    """psi = pi / 2 + arg mu at nodes of a positive real part, and from there by the turn of mu to the other end of the interval."""
+    trace, determinant = characteristic
+    root = kernels.roots_along(trace, determinant)
+    crossings = 0
+    for sign in (1.0, -1.0):
+        mu, start, end = kernels.phase_steps(trace, root, sign)
+        np.testing.assert_allclose(mu, 0.5 * trace + sign * root, rtol=1e-12)
+        for k in range(OMEGA.size - 1):
+            if mu[k].real <= 0.0 and mu[k + 1].real <= 0.0:
+                assert np.isnan(start[k])
+                assert np.isnan(end[k])
+                continue
+            crossings += (mu[k].real > 0.0) != (mu[k + 1].real > 0.0)
+            for angle, value in ((start[k], mu[k]), (end[k], mu[k + 1])):
+                assert np.exp(1j * (angle - 0.5 * np.pi)) == pytest.approx(value / abs(value), abs=1e-9)
+            assert end[k] - start[k] == pytest.approx(np.angle(mu[k + 1] / mu[k]), abs=1e-9)
+    assert crossings >= 2
+
+
+def test_where_one_direction_is_rigid_its_eigenvalue_is_zero():
+    trace = np.full(4, 2.0 - 1.0j)
+    rounding = np.full(4, 1e-14 + 0.0j)
+    mu, start, end = kernels.phase_steps(trace, kernels.roots_along(trace, rounding), -1.0)
+    assert np.all(mu == 0.0)
+    assert np.all(np.isnan(start))
+    assert np.all(np.isnan(end))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("before", [1, 2])
+def test_a_limit_in_the_first_interval_of_a_band_is_found(characteristic, before):
+    """A band that begins right below the chatter frequency gives the limit that the whole band gives."""
+    uneven, speed = np.array([1.9, 2.2, 2.0 * np.pi - 4.1]), np.array([1333.0])
+    limit, chatter, _ = kernels.pitch_envelope(OMEGA, *characteristic, STIFFNESS, uneven, speed)
+    first = int(np.searchsorted(OMEGA, chatter[0])) - before
+    parts = (OMEGA[first:], characteristic[0][first:], characteristic[1][first:])
+    again, frequency, _ = kernels.pitch_envelope(*parts, STIFFNESS, uneven, speed)
+    assert again[0] == pytest.approx(limit[0], rel=1e-5)
+    assert frequency[0] == pytest.approx(chatter[0], rel=1e-6)

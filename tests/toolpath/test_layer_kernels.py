@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.toolpath._layer_kernels import layer_arcs
+from rcsa_ident.toolpath._layer_kernels import layer_arcs, material_ahead
 from rcsa_ident.toolpath.dexel import DexelField
 
 
@@ -25,3 +25,78 @@ def test_a_wall_in_a_thin_layer_is_known_to_half_a_cell(side):
     wanted = (0.0, border) if side > 0 else (border, np.pi)
     assert radius * np.cos(arcs[0]) == pytest.approx(radius * np.cos(wanted), abs=0.3e-3)
     assert layer_arcs(seg, field.counts[2], field.lattice, centre + [0.0, 0.0, 0.01], radius, np.array([1.0, 0.0]), arcs) == 0  # noqa: RUF005
+
+
+#: Heights and radii of outlines: a ball, a dovetail that narrows upwards, a disc on a thin shank.
+OUTLINES = {
+    "ball": np.array([[0.0, 0.0006, 0.0018, 0.004, 0.012], [0.0, 0.0022, 0.0034, 0.004, 0.004]]),
+    "dovetail": np.array([[0.0, 0.005, 0.012], [0.004, 0.0016, 0.0016]]),
+    "disc": np.array([[0.0, 0.002, 0.002, 0.012], [0.005, 0.005, 0.001, 0.001]]),
+}
+
+
+def heights_of_material(seg, count, lattice, tip, outline, edge):
+    """All heights of a fine scale at which a line has material and the outline, wider by a cell, reaches it."""
+    beside = max(lattice[1, :2])
+    height = (np.arange(8000) + 0.5) * edge / 8000
+    wide = np.interp(height, outline[0], outline[1])
+    met = np.zeros(height.size, dtype=bool)
+    for m in range(seg.shape[0]):
+        for n in range(seg.shape[1]):
+            away = np.hypot(*(lattice[0, :2] + lattice[1, :2] * [m, n] - tip[:2]))
+            if away >= outline[1].max() + beside:
+                continue
+            reached = wide > max(away - beside, 0.0)
+            for low, high in seg[m, n, : count[m, n]]:
+                met |= reached & (height + tip[2] > low) & (height + tip[2] < high)
+    return height[met]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", OUTLINES)
+def test_material_ahead_is_what_a_plain_search_finds(kind, seed):
+    """Lines with gaps at any heights, a tool that stands anywhere, also half beside the block."""
+    rng = np.random.default_rng(seed)
+    field = DexelField.block([0.001, -0.002, 0.0], [0.016, 0.008, 0.01], np.array([0.8e-3, 0.5e-3, 0.5e-3])[seed % 2])
+    seg, count = np.zeros((*field.shape[:2], 2, 2)), rng.integers(0, 3, field.shape[:2])
+    bounds = np.sort(rng.uniform(0.0, 0.01, (*field.shape[:2], 4)), axis=2)
+    seg[:] = bounds.reshape(*field.shape[:2], 2, 2)
+    # little of it, so that the range has ends inside of the edge
+    count[rng.random(count.shape) < 0.97] = 0
+    ranges = 0
+    for _ in range(6):
+        tip = np.array([rng.uniform(-0.003, 0.018), rng.uniform(-0.006, 0.012), rng.uniform(-0.003, 0.008)])
+        edge = rng.uniform(0.003, 0.011)
+        low, high = material_ahead(seg, count, field.lattice, tip, OUTLINES[kind], edge)
+        expected = heights_of_material(seg, count, field.lattice, tip, OUTLINES[kind], edge)
+        if expected.size == 0:
+            # what the scale steps over is no range to speak of
+            assert high - low < 2e-5
+            continue
+        ranges += 1
+        assert [low, high] == pytest.approx([expected[0], expected[-1]], abs=2.0 * edge / 8000)
+    assert ranges
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.1, -2.3])
+def test_arcs_in_front_of_a_slot_in_a_layer(turn):
+    """Two walls beside a slot that the tool goes along: two arcs, whichever way the feed goes, in cells that are not square."""
+    radius, half = 0.006, 0.0025
+    feed = np.array([np.cos(turn), np.sin(turn)])
+    lattice = np.array([[-0.012, -0.0125, 0.0], [0.4e-3, 0.3e-3, 0.4e-3]])
+    centre = np.array([0.0002, -0.0003, 0.001])
+    seg, count = np.zeros((61, 84, 2, 2)), np.ones((61, 84), dtype=int)
+    x, y = (lattice[0, k] + lattice[1, k] * np.arange(n) - centre[k] for k, n in ((0, 61), (1, 84)))
+    along = x[:, None] * feed[0] + y * feed[1]
+    across = y * feed[0] - x[:, None] * feed[1]
+    gone = (np.hypot(x[:, None], y) < radius) | (along < 0.0) | (np.abs(across) < half)
+    # a second piece of material above, where nothing is cut
+    seg[:, :, 0] = np.where(gone[..., None], [0.0, 0.0005], [0.0, 0.002])
+    seg[:, :, 1], count[:] = [0.003, 0.004], 2
+    arcs = np.empty((4, 2))
+    assert layer_arcs(seg, count, lattice, centre, radius, feed, arcs) == 2
+    border = np.arccos(half / radius)
+    expected = radius * np.cos([[0.0, border], [np.pi - border, np.pi]])
+    assert radius * np.cos(arcs[:2]) == pytest.approx(expected, abs=0.3e-3)
+    # without room for the second one, the first is told
+    assert layer_arcs(seg, count, lattice, centre, radius, feed, arcs[:1]) == 1

@@ -29,7 +29,7 @@ for name, limit in limits.items():
 # The map of the helical mill follows every boundary, of islands, too; only a share of its points is computed.
 found = ri.stability_map(tip, helical, ri.rpm(8000, 24_000, 50), np.linspace(0.3e-3, 18e-3, 120))
 print(found)
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 ax.contourf(to_rpm(found.spindle_speed), 1e3 * found.depth, found.stable.T, levels=[-0.5, 0.5, 1.5], colors=["#F3D3C4", "#D5EBE3"])
 ax.contour(to_rpm(found.spindle_speed), 1e3 * found.depth, found.growth.T, levels=[0.0], colors="#0072B2", linewidths=1.6)
 ax.set(xlabel="spindle speed [rev/min]", ylabel="axial depth [mm]", title="5 % immersion, helix 30°: stable (green), chatter (red)")

@@ -34,7 +34,7 @@ limits = [ri.stability_lobes(tip, each, speeds, 6e-3, exact).limit_depth for eac
 
 # %%
 # Left the outline, right the limits.
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9), width_ratios=(1.0, 1.5))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9), width_ratios=(1.0, 1.5), layout="constrained")
 r, z = 1e3 * outline.outline(6e-3).T
 for side in (-1.0, 1.0):
     left.fill_betweenx(z, 0.0, side * r, color="0.88")

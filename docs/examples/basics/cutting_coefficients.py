@@ -29,7 +29,7 @@ expected = np.array([true.tangential, true.tangential * true.radial_ratio, true.
 
 # %%
 # Intervals of 95 % come with every coefficient.
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
 for k, name in enumerate("XY"):
     left.plot(1e3 * feeds, force[:, k], "o", color=f"C{k}", label=f"mean force along {name}")
     line = np.polyfit(feeds, force[:, k], 1)

@@ -52,7 +52,7 @@ found = least_squares_flange(measured, joint)
 slender = artefact(0.08, 0.03)
 tip = couple(slender, MeasuredFlange(found.receptance).receptance(omega), joint)["tip", "tip"][:, 0, 0]
 true = couple(slender, machine, joint)["tip", "tip"][:, 0, 0]
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 4.0))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 4.0), layout="constrained")
 for (i, j), name in (
     ((0, 0), "force to translation [m/N]"),
     ((0, 1), "moment to translation [m/(N m)]"),

@@ -27,7 +27,7 @@ sampled = force_history(cutter, conditions, coefficients, angle, slices=200)[:, 
 
 # %%
 # Equal teeth would leave only every fourth order; these leave all of them.
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
 for k, name in enumerate("XY"):
     left.plot(np.degrees(angle), sampled[:, k], lw=4.0, alpha=0.3, color=f"C{k}", label=f"{name}, sampled")
     left.plot(np.degrees(angle), from_lines[:, k], lw=1.1, color=f"C{k}", label=f"{name}, sum of lines")

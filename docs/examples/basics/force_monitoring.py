@@ -39,7 +39,7 @@ true = {axis: np.abs(table[f"{axis}_re"] + 1j * table[f"{axis}_im"])[inside] for
 
 # %%
 # The mean force moves nothing that vibrates and stays unknown; every line of the band is there.
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
 shown = time < time[0] + 2.0 * turns
 for k, axis in enumerate("XY"):
     left.plot(1e3 * (time[shown] - time[0]), estimate.force[shown, k], label=axis)

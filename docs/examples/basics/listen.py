@@ -35,7 +35,7 @@ print("speeds to try [rev/min]:", [round(to_rpm(each)) for each in heard.suggest
 window = np.hanning(signal.size)
 spectrum = 2.0 * np.abs(np.fft.rfft(signal * window)) / window.sum()
 order = np.fft.rfftfreq(signal.size, 1.0 / rate) / (heard.spindle_speed / (2.0 * np.pi))
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 ax.semilogy(order, spectrum, lw=0.8)
 for tooth in (4, 8, 12):
     ax.axvline(tooth, color="0.75", lw=5, zorder=0)

@@ -24,7 +24,7 @@ print(lobes)
 # %%
 # Below the absolute limit no speed chatters. Pockets stand where a tooth passes once in a whole number of vibrations.
 speed, limit = to_rpm(lobes.spindle_speed), 1e3 * lobes.limit_depth
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 ax.fill_between(speed, limit, 1.0, color="#C8501A", alpha=0.12, lw=0.0, label="chatter")
 ax.plot(speed, limit, label="stability limit")
 ax.axhline(1e3 * lobes.absolute_limit, color="0.3", ls="--", lw=1.0, label=f"absolute limit, {1e3 * lobes.absolute_limit:.4f} mm")

@@ -37,7 +37,7 @@ speeds = advice.lobes.spindle_speed
 true = ri.stability_lobes(tip, process, speeds, max_depth=10e-3).limit_depth
 band = 1e3 * np.quantile(advice.lobes.drawn, (0.025, 0.975), axis=0)
 
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 ax.fill_between(to_rpm(speeds), *band, color="C0", alpha=0.2, lw=0.0, label="95 % of the possible machines")
 ax.plot(to_rpm(speeds), 1e3 * advice.lobes.limit_depth, label="predicted limit")
 ax.plot(to_rpm(speeds), 1e3 * true, "--", color="0.2", lw=1.1, label="true limit")

@@ -64,7 +64,7 @@ with tempfile.TemporaryDirectory() as folder:
     picture = Path(folder) / "part.png"
     save_coloured_part(picture, removal.part, removal.path, judged.margin, "margin to chatter [-]", (0.5, 1.5), 0.005)
     image = plt.imread(picture)
-fig, ax = plt.subplots(figsize=(11.0, 4.8))
+fig, ax = plt.subplots(figsize=(11.0, 4.8), layout="constrained")
 ax.imshow(image)
 ax.set_axis_off()
 

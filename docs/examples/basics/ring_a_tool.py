@@ -62,7 +62,7 @@ print(found)
 known = [line for line in found.lines if line.mode is not None and line.after is not None]
 omega = np.array([(line.mode.omega, line.after, line.heard.omega) for line in known])
 before, after = (100.0 * (omega[:, k] / omega[:, 2] - 1.0) for k in range(2))
-fig, ax = plt.subplots(figsize=(7.2, 3.0))
+fig, ax = plt.subplots(figsize=(7.2, 3.0), layout="constrained")
 ax.plot(before, range(len(known)), "o", color="0.6", ms=9, label="as drawn")
 ax.plot(after, range(len(known)), "o", color="C2", ms=9, label="as learned")
 names = [f"{'tool alone' if line.bare else 'in its holder'}, {to_hz(line.heard.omega):.0f} Hz" for line in known]

@@ -38,7 +38,7 @@ postures = following(arm.model, posture, places, np.tile([0.0, 0.0, 1.0], (way.s
 cut, speeds = ri.CutSpec(coefficients={"tangential": 660e6, "radial_ratio": 0.38}), ri.rpm(600, 6000, 50)
 limits, _ = limits_along(ToolChange(machine, tool, cut, speeds, 10e-3, recommend=False), postures)
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.0))
+fig, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.0), layout="constrained")
 for axis in "xy":
     left.loglog(to_hz(omega), 1e6 * np.abs(tip.between(f"tip.{axis}", f"tip.{axis}")), label=axis.upper())
 left.set(xlabel="frequency [Hz]", ylabel="tooltip receptance [µm/N]", title="At the posture")

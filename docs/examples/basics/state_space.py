@@ -32,7 +32,7 @@ limits = [ri.stability_lobes(each, cut, speeds, 5e-3, exact).limit_depth for eac
 
 # %%
 # Lobes by the zero-order method, dots by full discretisation.
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 for each, points, name in zip(lobes, limits, ("bare, damping ratio 1.1 %", "with the actuator, 4.1 %"), strict=True):
     (line,) = ax.plot(to_rpm(each.spindle_speed), 1e3 * each.limit_depth, label=name)
     ax.plot(to_rpm(speeds), 1e3 * points, "o", color=line.get_color())

@@ -32,7 +32,7 @@ holder = (ri.BeamSegment(0.04, 0.05, steel, 0.012), ri.BeamSegment(0.058, 0.063,
 # The contact between tool and holder is springs and dampers along the insertion.
 stickouts = np.array([0.050, 0.057, 0.064, 0.071])
 omega, peaks = ri.hz(500.0, 4500.0, 5.0), []
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 for stickout in stickouts:
     assembly = ri.clamped(tool, holder, stickout, insertion=0.0395, contact=ri.Contact(2e10, 6e5, 1e5, 40.0))
     height = np.abs(machine.tip(assembly, omega).between("tip.x", "tip.x"))

@@ -29,7 +29,7 @@ print(surface)
 # %%
 # At which speeds is the cut stable with a reserve of a third, and the wall within two micrometres?
 good = (lobes.limit_depth > 1.5 * depth) & (np.abs(surface.largest) < 2e-6)
-fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.2), sharex=True)
+fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.2), sharex=True, layout="constrained")
 top.plot(to_rpm(speeds), np.minimum(1e3 * lobes.limit_depth, 12.0))
 top.axhline(1e3 * depth, color="0.3", ls="--", lw=1.0, label="this cut, 2 mm")
 top.set(ylabel="stability limit [mm]", ylim=(0.0, 12.3), title="Full discretisation")

@@ -54,7 +54,7 @@ print(best)
 
 # %%
 # Above: measured and true. Below: where the tool may cut.
-fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.6))
+fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.6), layout="constrained")
 inside = (tip.omega > ri.hz(300.0)) & (tip.omega < ri.hz(3000.0))
 frequency = to_hz(tip.omega[inside])
 for axis in "xy":

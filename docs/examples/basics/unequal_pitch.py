@@ -39,7 +39,7 @@ speeds = ri.rpm(3500, 9000, 50)
 lobes = {
     name: ri.stability_lobes(tip, cut(first), speeds, 0.03, method).limit_depth for name, first in (("equal, 90°", 90.0), ("best", best))
 }
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9), layout="constrained")
 left.plot(angles, 1e3 * limits, "o-")
 left.plot(best, 1e3 * limits.max(), "o", color="C1", ms=10)
 left.set(xlabel="first angle of the pitch [deg]", ylabel="stability limit [mm]", title=f"At {to_rpm(speed):.0f} rev/min")

@@ -47,7 +47,7 @@ chosen = exchanged(prospects, greedy(prospects, 4, MeanVariance()), MeanVariance
 planned, even = (deviations(prospects, order)[:, 0] for order in (chosen, [0, 32, 64, 96]))
 print("chosen [rev/min]:", sorted(np.round(to_rpm(speeds[chosen])).astype(int).tolist()))
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9), width_ratios=(1.4, 1.0))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.2, 3.9), width_ratios=(1.4, 1.0), layout="constrained")
 left.semilogy(to_hz(band), 1e6 * np.abs(h), color="0.5", label="receptance")
 for speed in sorted(speeds[chosen]):
     lines = teeth * speed * np.arange(1, 4)

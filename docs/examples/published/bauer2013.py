@@ -52,7 +52,7 @@ left_over = {name: np.linalg.norm(off(commanded)) for name, commanded in ways.it
 
 # %%
 # The springs across the axes decide: without them no mode lies below 15 Hz.
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.8))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.8), layout="constrained")
 for k, (values, name) in enumerate(((measured, "measured"), (every, "all springs"), (drives, "drives alone"))):
     left.bar(np.arange(4) + 0.27 * (k - 1), values, 0.25, color=("0.5", "C0", "C4")[k], label=name)
 left.set(xticks=range(4), xticklabels=["1", "2", "3", "4"], xlabel="mode [-]", ylabel="natural frequency [Hz]", title="First modes")

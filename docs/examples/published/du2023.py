@@ -34,7 +34,7 @@ cuts = {"rigid, sharp": sharp, "bent": deflected_process(sharp, bent), "damped":
 speeds, method = ri.rpm(6800, 9600, 200), ri.FullDiscretisation()
 at_8200 = {name: ri.stability_lobes(tip, cut, ri.rpm(8200), 20e-3, method).limit_depth[0] for name, cut in cuts.items()}
 edge = deflected_edge(sharp, bent, ri.rpm(10_000), 6.85e-3)
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0), width_ratios=(1.5, 1.0))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0), width_ratios=(1.5, 1.0), layout="constrained")
 for name in ("rigid, sharp", "bent and damped"):
     left.plot(
         to_rpm(speeds),

@@ -36,7 +36,7 @@ found = {
     type(method).__name__: 1e3 * ri.stability_lobes(tip, cut, ri.rpm(1.0) * rpm, 30e-3, method).limit_depth
     for method in (ri.FullDiscretisation(), ri.MultiFrequency(), ri.ZeroOrder())
 }
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 ax.plot(to_rpm(speeds), 1e3 * exact.limit_depth, label="full discretisation")
 ax.plot(to_rpm(speeds), 1e3 * mean.limit_depth, "--", lw=1.1, label="zero-order method")
 ax.plot(rpm, reference, "ko", label="spectral elements")

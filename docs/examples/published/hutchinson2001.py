@@ -44,7 +44,7 @@ for pieces in (1, 2, 4, 8, 16):
     counts.append(structure.mass.shape[0])
     errors.append(np.abs(found / roots - 1.0))
 errors = np.array(errors)
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 for k in range(1, 5):
     ax.loglog(counts, errors[:, k], "o-", label=f"mode {k + 1}, {roots[k]:.0f} Hz")
 ax.set(xlabel="degrees of freedom [-]", ylabel="relative error of the natural frequency [-]", title="Clamped carbide shank, Ø12 × 100 mm")

@@ -39,7 +39,7 @@ published = {
     "all springs": (8.79, -25.70, 16.29, 44.47),
     "all springs, play": (8.92, -25.43, 16.41, 44.15),
 }
-fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0))
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0), layout="constrained")
 errors = {}
 for name, carrier in carriers.items():
     found, _ = mill_block(carrier, cut, 0.09, (-np.inf, -0.001), feed)

@@ -57,7 +57,7 @@ for name, sign in (("slopes as printed", 1.0), ("slopes negated", -1.0)):
 
 # %%
 # A point's receptance that dissipates has a negative imaginary part at all frequencies.
-fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.2), sharex=True)
+fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.2), sharex=True, layout="constrained")
 for (name, tip), colour in zip(tips.items(), ("C1", "C0"), strict=True):
     top.plot(to_hz(omega), 1e6 * np.abs(tip), color=colour, label=name)
     bottom.plot(to_hz(omega), 1e6 * tip.imag, color=colour)

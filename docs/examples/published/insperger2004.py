@@ -33,7 +33,7 @@ operator = ri.FullDiscretisation().monodromy(tip, slot)
 depths, multipliers = np.array([0.2, 0.5, 0.7, 1.0]), np.array([0.81974278, 1.07397559, 1.22155614, 1.40647353])
 found = np.array([abs(operator.multiplier(ri.rpm(5000), 1e-3 * a, 0.5 * longest_step(operator)).value) for a in depths])
 
-fig, ax = plt.subplots()
+fig, ax = plt.subplots(layout="constrained")
 ax.contourf(to_rpm(chart.spindle_speed), 1e3 * chart.depth, chart.stable.T, levels=[-0.5, 0.5, 1.5], colors=["#F3D3C4", "#D5EBE3"])
 ax.contour(to_rpm(chart.spindle_speed), 1e3 * chart.depth, chart.growth.T, levels=[0.0], colors="#0072B2", linewidths=1.6)
 ax.plot(rpm, reference, "ko", ms=6, label="spectral elements")

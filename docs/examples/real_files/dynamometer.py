@@ -34,7 +34,7 @@ if files:
     print(found.notes[-1] if found.notes else found.forces)
 
     (tangential, half), (radial, radial_half) = found.forces.of("K_tc"), found.forces.of("K_rc")
-    fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.9), width_ratios=(1.4, 1.0))
+    fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.9), width_ratios=(1.4, 1.0), layout="constrained")
     means = np.array([measured.record.mean[:2] for measured in found.used])
     model = np.array([found.mean_force_model(measured)[:2] for measured in found.used])
     per_tooth = np.array(feeds) / 12_000

@@ -22,7 +22,7 @@ if files:
     cut = ri.MillingProcess(ri.Cutter(2, 31.75e-3), steel, half)
     lobes = ri.stability_lobes(tip, cut, ri.rpm(2000, 20_000, 25), max_depth=20e-3)
 
-    fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.6))
+    fig, (top, bottom) = plt.subplots(2, 1, figsize=(7.2, 5.6), layout="constrained")
     for axis in "xy":
         top.semilogy(to_hz(tip.omega), 1e6 * np.abs(tip.between(f"tip.{axis}", f"tip.{axis}")), label=axis.upper())
     top.set(xlabel="frequency [Hz]", ylabel="receptance [µm/N]", xlim=(100, 4000), ylim=(0.01, 4.0), title="Measured at the tip")

@@ -43,7 +43,7 @@ if files:
     tip = found.machine.tip(tooling, ri.hz(1.0) * frequency)
     h = tip.between("tip.x", "tip.x")
 
-    fig, ax = plt.subplots()
+    fig, ax = plt.subplots(layout="constrained")
     ax.semilogy(frequency, 1e6 * np.abs(true), color="0.2", label="measured at the tip")
     ax.semilogy(to_hz(tip.omega), 1e6 * np.abs(h), label="predicted from hits on the holder")
     ax.set(xlabel="frequency [Hz]", ylabel="tip receptance [µm/N]", title="A real machining centre")

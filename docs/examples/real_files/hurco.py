@@ -40,7 +40,7 @@ if files:
     away = 100.0 * (speed / named - 1.0)
 
     colours = {"stable": "C2", "chatter": "C1", "idle": "0.5"}
-    fig, ax = plt.subplots(figsize=(8.6, 4.6))
+    fig, ax = plt.subplots(figsize=(8.6, 4.6), layout="constrained")
     rows = np.flatnonzero(~ramp)
     for row, k in enumerate(rows):
         share = heard[k].explained_share

@@ -43,7 +43,7 @@ if files:
     stable = model.noise.stable(drawn[:, place] - np.log(every.axial_depth)).mean(axis=0)
     right = (stable > 0.5) == every.seen(Verdict.STABLE)
 
-    fig, ax = plt.subplots(figsize=(8.0, 4.4))
+    fig, ax = plt.subplots(figsize=(8.0, 4.4), layout="constrained")
     low, middle, high = 1e3 * np.exp(np.quantile(drawn, (0.05, 0.5, 0.95), axis=0))
     ax.fill_between(to_rpm(speeds), low, high, color="C0", alpha=0.2, lw=0.0, label="limit, 90 % of the draws")
     ax.plot(to_rpm(speeds), middle, label="limit, median")

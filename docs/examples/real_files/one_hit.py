@@ -23,7 +23,7 @@ if files:
     (theirs,) = read_frfs(files[1])
     time, force, _ = np.loadtxt(files[0]).T
 
-    fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0), width_ratios=(1.0, 1.6))
+    fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0), width_ratios=(1.0, 1.6), layout="constrained")
     start = time[np.argmax(force)]
     left.plot(1e3 * (time - start), force)
     left.set(xlabel="time around the hit [ms]", ylabel="force [N]", xlim=(-1.0, 2.0), title="The hammer")

@@ -19,7 +19,7 @@ address = "https://github.com/hafeztrimukti29/chatter-detection-using-accoustic-
 files = real_files(address, "two_sounds.png", "milling_sound/Chatter.wav", "milling_sound/Stable.wav")
 if files:
     heard = [ri.listen(file, teeth=6) for file in files]
-    fig, panels = plt.subplots(2, 1, figsize=(7.6, 5.6))
+    fig, panels = plt.subplots(2, 1, figsize=(7.6, 5.6), layout="constrained")
     for ax, file, each in zip(panels, files, heard, strict=True):
         signal, rate, turn = each.record.loudest, each.record.rate, each.spindle_speed / (2.0 * np.pi)
         frequency, power = scipy.signal.welch(signal, rate, nperseg=int(2 * rate))
