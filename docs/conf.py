@@ -1,4 +1,7 @@
-"""The documentation site: `python -m sphinx -W --keep-going docs public` builds it; with `-t quick` no example of the gallery runs."""
+"""The documentation site: `python -m sphinx -W --keep-going docs public` builds it; with `-t quick` no example of the gallery runs.
+
+Asked again, the same command builds changed pages alone.
+"""
 
 from __future__ import annotations
 
