@@ -1,4 +1,4 @@
-"""Published arms: equations of motion, places, postures, natural frequencies, compliance, limits, compensation, the most telling posture."""
+"""Published arms: equations of motion, places, postures, modes, compliance, limits, compensation, the most telling posture."""
 
 from __future__ import annotations
 
