@@ -36,8 +36,8 @@ else it does.
 
 {machine}. {versions}.{missing}
 
-Where the peer is NumPy or SciPy, it is the vectorised form that an engineer would write, not a slow twin. Kernels are compiled before
-the first round. How accurate both are stands in the row: a ratio without it says nothing.
+Where the peer is NumPy or SciPy, it is vectorised where the task allows it, not a slow twin. Kernels are compiled before the first
+round. How accurate both are stands in the row: a ratio without it says nothing.
 
 | task | peer | accuracy of both | peer's time over ours: median | least | most |
 |---|---|---|---|---|---|

@@ -1,4 +1,4 @@
-"""Closed forms of cutting forces, lobes, walls, observers, signals, removal of material and robots' equations."""
+"""Closed forms of cutting forces, lobes, walls, observers, signals and removal of material."""
 
 from __future__ import annotations
 
@@ -22,12 +22,9 @@ from rcsa_ident.cutting.power import spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.state_space import StateSpace
-from rcsa_ident.machine.robot.inertia import mass_matrix, torques
-from rcsa_ident.machine.robot.kinematics import flange_at, posed, postures_of
 from rcsa_ident.observer.force_model import RandomWalk
 from rcsa_ident.observer.kalman import kalman_filter, riccati
 from rcsa_ident.observer.margins import loop_margins
-from rcsa_ident.samples import sample_robot
 from rcsa_ident.signals.ring_down import ring_down
 from rcsa_ident.signals.tap import tap
 from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
@@ -37,7 +34,7 @@ from rcsa_ident.toolpath.walls import NOTHING, Walls
 from rcsa_ident.units import to_hz
 from tests.cutting import test_force
 from tests.observer import test_kalman
-from tests.oracles import literature, multibody, naive
+from tests.oracles import literature, naive
 from tests.signals import test_ring_down, test_tap
 from tests.stability import test_surface_error as walls
 from tests.stability import test_zero_order
@@ -202,31 +199,6 @@ def arcs(upright: bool) -> float:
     """Largest error of entry and exit beside a wall [deg]."""
     lays = [None] * 100 if upright else leaning_turns()
     return float(np.max(np.concatenate([beside(FLAT, seed, turn) for seed, turn in enumerate(lays)])))
-
-
-def all_postures() -> np.ndarray:
-    """How far the flange stands from where each of its postures brings it, 100 places of three arms [m]."""
-    rng, worst = np.random.default_rng(2), []
-    for name in ("tx200", "kr210", "kr500"):
-        arm = sample_robot(name)
-        for angles in rng.uniform(-np.pi, np.pi, (100, 6)):
-            flange = flange_at(arm, angles)
-            found = postures_of(arm, flange, within_limits=False)
-            worst.append(max(np.max(np.abs(flange_at(arm, each).offset - flange.offset)) for each in found))
-    return np.array(worst)
-
-
-@cache
-def arm_at(ours: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrix of all 18 freedoms and torques of the TX200, each over its largest."""
-    arm, rng = sample_robot("tx200"), np.random.default_rng(3)
-    every, plain = rng.uniform(-2.0, 2.0, 18), rng.uniform(-2.0, 2.0, (3, 6))
-    gravity, still, tilting = np.array([0.3, -0.2, -9.7]), posed(arm, plain[0]), posed(arm, every, True)
-    mass = multibody.kinetic_matrix(tilting.chain, every)
-    torque = multibody.lagrange_torques(still.chain, *plain, gravity)
-    if ours:
-        return mass_matrix(tilting) / np.abs(mass).max(), torques(still, plain[1], plain[2], gravity) / np.abs(torque).max()
-    return mass / np.abs(mass).max(), torque / np.abs(torque).max()
 
 
 def play() -> float:
@@ -489,36 +461,5 @@ CASES = (
         "m",
         1e-9,
         f"{_MARCH}::test_a_spring_with_play_lets_go_within_and_holds_beyond",
-    ),
-    Case(
-        "inverse kinematics of three arms: the flange of every posture of 300 places",
-        "the place that was asked for",
-        np.zeros(300),
-        all_postures,
-        "m",
-        1e-9,
-        "tests/machine/robot/test_kinematics.py::test_all_postures_bring_the_flange_back",
-        Measure.ABSOLUTE,
-        slow=True,
-    ),
-    Case(
-        "mass matrix of an arm with 18 freedoms",
-        "kinetic energy of its bodies by differences (tests/oracles/multibody.py)",
-        lambda: arm_at(False)[0],
-        lambda: arm_at(True)[0],
-        "of the largest",
-        1e-8,
-        "tests/machine/robot/test_kernels.py::test_mass_matrix_is_the_sum_over_bodies",
-        Measure.ABSOLUTE,
-    ),
-    Case(
-        "torques of an arm on the move",
-        "[featherstone2008]; Lagrange's equations by differences (tests/oracles/multibody.py)",
-        lambda: arm_at(False)[1],
-        lambda: arm_at(True)[1],
-        "of the largest",
-        2e-5,
-        "tests/machine/robot/test_kernels.py::test_torques_are_those_of_lagrange",
-        Measure.ABSOLUTE,
     ),
 )

@@ -1,4 +1,4 @@
-"""Published arms: places, postures, natural frequencies, compliance, limits, compensation, the posture that tells a payload's mass."""
+"""Published arms: equations of motion, places, postures, modes, compliance, limits, compensation, the most telling posture."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from rcsa_ident.units import to_hz
 from rcsa_ident.workflows.robot_compensation import ahead_of_forces, mirrored_postures, reached
 from tests.fixtures.robots import BENT, KR600, STRETCHED, TABLE_7
 from tests.machine.robot import test_kinematics, test_posed_robot
+from tests.oracles import multibody
 
 #: What is told of others' arms: a program of its own, on the published data.
 ANOTHER = "another program, arm of [huynh2018]"
@@ -132,9 +133,65 @@ def beside_pinocchio(what: int, ours: bool) -> np.ndarray:
     return (own if ours else value) / np.max(np.abs(value))
 
 
+def all_postures() -> np.ndarray:
+    """How far the flange stands from where each of its postures brings it, 100 places of three arms [m]."""
+    rng, worst = np.random.default_rng(2), []
+    for name in ("tx200", "kr210", "kr500"):
+        arm = sample_robot(name)
+        for angles in rng.uniform(-np.pi, np.pi, (100, 6)):
+            flange = flange_at(arm, angles)
+            found = postures_of(arm, flange, within_limits=False)
+            worst.append(max(np.max(np.abs(flange_at(arm, each).offset - flange.offset)) for each in found))
+    return np.array(worst)
+
+
+@cache
+def arm_at(ours: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Mass matrix of all 18 freedoms and torques of the TX200, each over its largest."""
+    arm, rng = sample_robot("tx200"), np.random.default_rng(3)
+    every, plain = rng.uniform(-2.0, 2.0, 18), rng.uniform(-2.0, 2.0, (3, 6))
+    gravity, still, tilting = np.array([0.3, -0.2, -9.7]), posed(arm, plain[0]), posed(arm, every, True)
+    mass = multibody.kinetic_matrix(tilting.chain, every)
+    torque = multibody.lagrange_torques(still.chain, *plain, gravity)
+    if ours:
+        return mass_matrix(tilting) / np.abs(mass).max(), torques(still, plain[1], plain[2], gravity) / np.abs(torque).max()
+    return mass / np.abs(mass).max(), torque / np.abs(torque).max()
+
+
 _FLEXIBLE, _KINEMATICS = "tests/machine/robot/test_flexible.py", "tests/machine/robot/test_kinematics.py"
 _SPRINGS = {False: "drives alone", True: "with the springs across the axes"}
 CASES = (
+    Case(
+        "inverse kinematics of three arms: the flange of every posture of 300 places",
+        "the place that was asked for",
+        np.zeros(300),
+        all_postures,
+        "m",
+        1e-9,
+        "tests/machine/robot/test_kinematics.py::test_all_postures_bring_the_flange_back",
+        Measure.ABSOLUTE,
+        slow=True,
+    ),
+    Case(
+        "mass matrix of an arm with 18 freedoms",
+        "kinetic energy of its bodies by differences (tests/oracles/multibody.py)",
+        lambda: arm_at(False)[0],
+        lambda: arm_at(True)[0],
+        "of the largest",
+        1e-8,
+        "tests/machine/robot/test_kernels.py::test_mass_matrix_is_the_sum_over_bodies",
+        Measure.ABSOLUTE,
+    ),
+    Case(
+        "torques of an arm on the move",
+        "[featherstone2008]; Lagrange's equations by differences (tests/oracles/multibody.py)",
+        lambda: arm_at(False)[1],
+        lambda: arm_at(True)[1],
+        "of the largest",
+        2e-5,
+        "tests/machine/robot/test_kernels.py::test_torques_are_those_of_lagrange",
+        Measure.ABSOLUTE,
+    ),
     Case(
         "TX200: place and axes of the flange at 1000 postures, both printed tables of its dimensions",
         "[huynh2018], tables 1 and 2",
