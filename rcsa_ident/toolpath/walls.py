@@ -89,7 +89,7 @@ class Walls:
         A wall of which a cutter of 10 mm takes 4 mm, below the path (down-milling):
 
         >>> walls = Walls.block(0.09, -np.inf, -0.001, slices=6, margin=0.006)
-        >>> walls.tops.shape, round(float(walls.top_at(0.05)[0, 0]), 6)
+        >>> walls.tops.shape, round(float(walls.tops[0, 0, np.searchsorted(walls.x, 0.05)]), 6)
         ((2, 6, 25501), -0.001)
         """
         count = int(np.ceil((positive("length", length, "m") + 2.0 * margin) / positive("spacing", spacing, "m"))) + 1
