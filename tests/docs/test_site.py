@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from tests.fixtures.paths import ROOT
+from tests.web.conftest import CHROMIUM, QUIET
 
 VENDOR = ROOT / "docs" / "_static" / "vendor"
 
@@ -121,6 +122,33 @@ def test_the_references_are_made_of_what_they_describe(site):
     assert "--frf [X=]FILE[#RECORD]" in commands
     (schema,) = (site / "_downloads").rglob("tooling.json")
     assert json.loads(schema.read_text(encoding="utf-8"))["title"]
+
+
+@pytest.mark.slow(10)
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium: apt-get install chromium")
+def test_every_equation_is_set(pages):
+    """In a browser: what MathJax does not understand stands in red on the page."""
+    from playwright.sync_api import sync_playwright
+
+    equations = [path for path in pages if 'class="math' in path.read_text(encoding="utf-8")]
+    assert len(equations) > 15
+    wrong = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(QUIET))
+        shown = browser.new_page()
+        for path in equations:
+            shown.goto(path.as_uri())
+            shown.wait_for_function("window.MathJax?.startup?.promise")
+            shown.evaluate("MathJax.startup.promise")
+            wrong += [
+                f"{path.name}: {text}"
+                for text in shown.locator("[data-mjx-error]").evaluate_all("found => found.map(e => e.dataset.mjxError)")
+            ]
+            wrong += [f"{path.name}: not set"] * shown.evaluate(
+                "[...document.querySelectorAll('.math')].filter(e => !e.querySelector('mjx-container')).length"
+            )
+        browser.close()
+    assert wrong == []
 
 
 def test_the_vendored_files_are_the_published_ones():
