@@ -68,7 +68,6 @@ def fresh(assembly: ToolAssembly, omega: np.ndarray) -> Receptance:
 
 def ross_shaft() -> Race:
     """Free-free receptances of a stepped shaft at 400 frequencies, each side with the elements that give it four digits."""
-    ross = importlib.import_module("ross")
     omega = 2.0 * np.pi * np.linspace(100.0, 6000.0, 400)
     own = Material(ross_table.MATERIAL["E"], ross_table.MATERIAL["rho"], ross_table.MATERIAL["Poisson"])
     shaft = ToolAssembly(tuple(BeamSegment(length, outer, own, inner) for length, outer, inner in ross_table.SEGMENTS), (), 0.0)
@@ -78,22 +77,8 @@ def ross_shaft() -> Race:
         return fresh(shaft, omega).between("tip.x", "flange.x")
 
     def theirs(length: float = 0.005) -> np.ndarray:
-        material = ross.Material(name="steel", **ross_table.MATERIAL)
-        elements = [
-            ross.ShaftElement(L=stretch / count, idl=inner, odl=outer, material=material, shear_method_calc="cowper")
-            for stretch, outer, inner in ross_table.SEGMENTS
-            for count in [round(stretch / length)]
-            for _ in range(count)
-        ]
-        size = 6 * (len(elements) + 1)
-        mass, stiffness = np.zeros((size, size)), np.zeros((size, size))
-        for i, element in enumerate(elements):
-            place = slice(6 * i, 6 * i + 12)
-            mass[place, place] += element.M()
-            stiffness[place, place] += element.K()
-        plane = np.sort(np.concatenate([np.arange(0, size, 6), np.arange(4, size, 6)]))
-        mass, stiffness = (m[np.ix_(plane, plane)] for m in (mass, stiffness))
-        force = np.zeros(plane.size)
+        mass, stiffness = ross_table.plane_matrices(length)
+        force = np.zeros(len(mass))
         force[-2] = 1.0
         return np.array([scipy.linalg.solve(stiffness - w**2 * mass, force, assume_a="sym")[0] for w in omega])
 
