@@ -1,4 +1,4 @@
-"""Fuzzing of the REST interface: the harness of tests/api/test_openapi.py with other seeds and more cases of each operation.
+"""Fuzzing of the REST interface: the harness of tests/api/made_up.py with other seeds and more cases of each operation.
 
 ``python -m benchmarks fuzz_api --seed 1 --examples 200`` sends every operation 200 requests that its description allows and 200 that it
 does not, and ends with the first answer that is a server error or of a status, type or body that the description does not name.
@@ -22,7 +22,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--examples", type=int, default=100)
     parser.add_argument("--rounds", type=int, default=1)
     given = parser.parse_args(arguments)
-    from tests.api.test_openapi import answers
+    from tests.api.made_up import answers
 
     for number in range(given.seed, given.seed + given.rounds):
         begun, operations = time.process_time(), 0

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, StoredChannel, the_only
-from rcsa_ident.io.files import MEGABYTE, existing_file, mapped, replacing
+from rcsa_ident.io.files import MEGABYTE, Bytes, existing_file, mapped, replacing
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.signals.recording import LONGEST
 
@@ -42,8 +42,10 @@ FILTERS = {
     h5py.h5z.FILTER_LZF: "lzf",
 }
 #: How a global heap begins, where texts of any length and descriptions of virtual datasets stand: signature, version, size. Then come its
-#: objects, each with number, references and size.
-_HEAP, _HEAP_HEAD, _OBJECT = b"GCOL\x01\0\0\0", struct.Struct("<8sQ"), struct.Struct("<HHIQ")
+#: objects, each with number, references and size. The three bytes behind the version may be any.
+_HEAP, _HEAP_HEAD, _OBJECT = b"GCOL\x01", struct.Struct("<8sQ"), struct.Struct("<HHIQ")
+#: How a file begins, perhaps behind a block of its user; bytes that tell how long addresses are; and the class of a layout, behind its version.
+_SIGNATURE, _SUPERBLOCK, _VIRTUAL_LAYOUT = b"\x89HDF\r\n\x1a\n", 14, 3
 #: What the library raises on a broken file.
 _BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error)
 _LINKS = {h5py.h5l.TYPE_SOFT: "a soft link", h5py.h5l.TYPE_EXTERNAL: "a link to another file"}
@@ -122,10 +124,24 @@ def told_channels(path: Path) -> list[tuple[str, str]]:
 
 
 def _opened(path: Path) -> h5py.File:
-    """Open a file whose global heaps have an end: the library would look for the next object behind one of no size for ever."""
-    raw, seen = mapped(path, "recording", LARGEST_FILE), 0
+    """Open a file in which the library meets nothing that ends the process, or keeps it for ever.
+
+    It would look for the next object behind one of no size in a global heap for ever, and writes beyond its own memory where the
+    description of a virtual dataset claims more than its 32 dimensions.
+    """
+    raw = mapped(path, "recording", LARGEST_FILE)
+    heaps = _heaps(raw, str(path))
+    if heaps and _virtual(raw, heaps):
+        raise InputError("recording", "a virtual dataset", "samples in the file itself", str(path))
+    return h5py.File(path, "r", locking=False)
+
+
+def _heaps(raw: Bytes, where: str) -> list[int]:
+    """Return where global heaps begin, all of which have an end."""
+    heaps, seen = [], 0
     heap = raw.find(_HEAP)
     while 0 <= heap <= len(raw) - _HEAP_HEAD.size:
+        heaps.append(heap)
         end = min(heap + _HEAP_HEAD.unpack_from(raw, heap)[1], len(raw))
         place = heap + _HEAP_HEAD.size
         while place + _OBJECT.size <= end:
@@ -134,10 +150,29 @@ def _opened(path: Path) -> h5py.File:
             # number 0 is what is left of the heap, its own head included; the others stand at multiples of eight
             if (number == 0 and size < _OBJECT.size) or seen > MOST_HEAP_OBJECTS:
                 found = "a heap with an object of no size" if seen <= MOST_HEAP_OBJECTS else f"over {MOST_HEAP_OBJECTS} objects in heaps"
-                raise InputError("recording", f"one that cannot be read ({found})", "a complete HDF5 file", str(path))
+                raise InputError("recording", f"one that cannot be read ({found})", "a complete HDF5 file", where)
             place += size if number == 0 else _OBJECT.size + -(-size // 8) * 8
         heap = raw.find(_HEAP, heap + 1)
-    return h5py.File(path, "r", locking=False)
+    return heaps
+
+
+def _virtual(raw: Bytes, heaps: Sequence[int]) -> bool:
+    """Say whether the layout of a dataset is virtual: it names the heap in which its sources stand, counted from the superblock."""
+    base = next((at for at in (0, *(512 << n for n in range(22))) if raw[at : at + len(_SIGNATURE)] == _SIGNATURE), None)
+    if base is None or base + _SUPERBLOCK > len(raw):
+        # what the library does not open
+        return False
+    # a file of at most 2 GB has no more in the other bytes of an address
+    width = min(raw[base + (13 if raw[base + 8] < 2 else 9)], 4)
+    starts = np.array(heaps) - base
+    for first in range(0, len(raw), MEGABYTE):
+        block = np.frombuffer(raw[first : first + MEGABYTE + 2 + width], np.uint8)
+        places = np.flatnonzero(((block[:-1] == 4) | (block[:-1] == 5)) & (block[1:] == _VIRTUAL_LAYOUT))
+        places = places[places + 2 + width <= len(block)]
+        addresses = sum(block[places + 2 + i].astype(np.int64) << 8 * i for i in range(width))
+        if np.isin(addresses, starts).any():
+            return True
+    return False
 
 
 def _unit(dataset: h5py.Dataset) -> str:
@@ -261,8 +296,6 @@ def _dataset(file: h5py.File, name: str, present: list[str], where: str, vectors
     if not isinstance(dataset, h5py.Dataset):
         raise InputError(field, f"a {type(dataset).__name__.lower()}", "a dataset", where)
     plist = dataset.id.get_create_plist()
-    if plist.get_layout() == h5py.h5d.VIRTUAL:
-        raise InputError(field, "a virtual dataset", "samples in the file itself", where)
     if plist.get_external_count() > 0:
         raise InputError(field, "samples in an external file", "samples in the file itself", where)
     shape = dataset.shape

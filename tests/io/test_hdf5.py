@@ -40,6 +40,8 @@ from tests.fixtures.hostile_hdf5 import (
     twice_deflated,
     unwritten,
     virtual,
+    virtual_behind_a_user_block,
+    virtual_of_many_dimensions,
 )
 
 X = Sensor("x", Quantity.TRIGGER)
@@ -51,7 +53,9 @@ BROKEN: list[tuple[Callable[[Path], object], list[str]]] = [
     (external_link_beside, ["channel z", "a link to another file"]),
     (soft_link, ["channel x", "a soft link"]),
     (external_storage, ["channel x", "samples in an external file"]),
-    (virtual, ["channel x", "a virtual dataset"]),
+    (virtual, ["recording", "a virtual dataset", "in the file itself"]),
+    (virtual_behind_a_user_block, ["recording", "a virtual dataset"]),
+    (virtual_of_many_dimensions, ["recording", "a virtual dataset"]),
     (terabytes, ["8e+06 MB of declared samples", "at most 2048 MB"]),
     (bomb, ["8000000 bytes declared", "200 times the file's size"]),
     (huge_chunks, ["channel x", "chunks of 268 MB", "at most 8 MB"]),
