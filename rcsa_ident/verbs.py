@@ -214,6 +214,7 @@ def read_tap_tests(
     xy: str | Path | None = None,
     yx: str | Path | None = None,
     units: str | None = None,
+    from_hz: float = 0.0,
 ) -> Receptance:
     """Return a tip's receptance from tap tests: FRF.csv, UFF 58, CutPro- or MetalMAX-style text columns.
 
@@ -225,19 +226,26 @@ def read_tap_tests(
         Response in the first direction, force in the second one.
     units : str, optional
         As ``um/N`` or ``(m/s^2)/N``, whatever the files say; by default as they say.
+    from_hz : float [Hz]
+        Lines below it are left out: there, an accelerometer's drift is larger than what moves.
 
     Examples
     --------
     >>> import rcsa_ident as ri
-    >>> print(ri.read_tap_tests(y=ri.tap("hits.csv", axis="Y").save("TIP.csv")))
+    >>> tip = ri.tap("hits.csv", axis="Y").save("TIP.csv")
+    >>> print(ri.read_tap_tests(y=tip))
     tip.x, tip.y: 12569 frequencies, 2 to 25600 Hz
+    >>> print(ri.read_tap_tests(y=tip, from_hz=50.0))
+    tip.x, tip.y: 12545 frequencies, 51 to 25600 Hz
     """
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io import frf_files
     from rcsa_ident.machine.known_tip import measured_tip
 
     given = {("X", "X"): x, ("Y", "Y"): y, ("X", "Y"): xy, ("Y", "X"): yx}
-    tests = frf_files.read_tap_tests([frf_files.Source(Path(path), pair) for pair, path in given.items() if path is not None], units)
+    tests = frf_files.read_tap_tests(
+        [frf_files.Source(Path(path), pair) for pair, path in given.items() if path is not None], units, from_hz
+    )
     curves = {(Dof(a.lower()), Dof(b.lower())): curve for (a, b), curve in tests.items()}
     return measured_tip({a: c for (a, b), c in curves.items() if a is b}, {pair: c for pair, c in curves.items() if pair[0] is not pair[1]})
 

@@ -59,6 +59,7 @@ def tooltip(
     relative: Annotated[
         bool, typer.Option("--relative", help="Relative to the workpiece, where that gives way, too: what lobes are computed from.")
     ] = False,
+    plot: Plot = None,
     bands: Bands = True,
     stiffness_spread: StiffnessSpread = 0.05,
     json_: Json = False,
@@ -67,13 +68,14 @@ def tooltip(
     from rcsa_ident.errors import positive
 
     writable(out)
+    check_plot(plot)
     spindle_speed = None if speed is None else from_rpm(positive("--speed", speed, "rev/min"))
     share = share_of(stiffness_spread, "--stiffness-spread", 50.0)
     machine = read_machine(result)
     last = to_hz(machine.band[1]) if to is None else to  # type: ignore[index]
     first = to_hz(machine.lowest) if from_ is None else from_
     frequency = inclusive(first, last, step, ("--from", "--to", "--step"), "Hz")
-    tell_tooltip(machine, tooling, out, frequency, spindle_speed, bands, share, relative, json_)
+    tell_tooltip(machine, tooling, out, frequency, spindle_speed, bands, share, relative, plot, json_)
 
 
 def tell_tooltip(
@@ -85,9 +87,10 @@ def tell_tooltip(
     bands: bool = True,
     stiffness_spread: float = 0.0,
     relative: bool = False,
+    plot: Path | None = None,
     json_: bool = False,
 ) -> None:
-    """Write the tooltip FRF of a tooling on a machine at frequencies [Hz], and print its peaks."""
+    """Write the tooltip FRF of a tooling on a machine at frequencies [Hz], draw it, and print its peaks."""
     from rcsa_ident.io.curves import write_tip_csv
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.tool_change import tooltip as ask
@@ -98,6 +101,11 @@ def tell_tooltip(
         found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, stiffness_spread, relative)
         deviation = found.tip.deviation()
     write_tip_csv(out, found.tip)
+    if plot is not None:
+        from rcsa_ident.report.curves import tip_figure
+        from rcsa_ident.report.lobes import save_figure
+
+        save_figure(tip_figure(found.tip, machine.band), str(plot))
     peaks = peaks_of(frequency, found.tip, deviation)
     if json_:
         summary = {"frequencies": len(frequency), "peaks": {name: asdict(p) for name, (p, _) in peaks.items()}}

@@ -95,12 +95,14 @@ def tip(
     from_: Annotated[float, typer.Option("--from", help="Lowest frequency, Hz.")] = 1.0,
     to: Annotated[float, typer.Option("--to", help="Highest frequency, Hz.")] = 4500.0,
     step: Annotated[float, typer.Option(help="Frequency step, Hz.")] = 0.25,
+    plot: Plot = None,
     json_: Json = False,
 ) -> None:
     """Predict the tooltip FRF of a tooling on an arm at a posture, along the tool's x, its y turned around, and into the spindle."""
     writable(out)
+    check_plot(plot)
     machine = replace(posed_robot(robot, posture, joints_only), highest=from_hz(to))
-    tell_tooltip(machine, tooling, out, inclusive(from_, to, step, ("--from", "--to", "--step"), "Hz"), json_=json_)
+    tell_tooltip(machine, tooling, out, inclusive(from_, to, step, ("--from", "--to", "--step"), "Hz"), plot=plot, json_=json_)
 
 
 @answers

@@ -44,7 +44,7 @@ FILTERS = {
 #: How a global heap begins, where texts of any length and descriptions of virtual datasets stand: signature, version, size. Then come its
 #: objects, each with number, references and size. The three bytes behind the version may be any.
 _HEAP, _HEAP_HEAD, _OBJECT = b"GCOL\x01", struct.Struct("<8sQ"), struct.Struct("<HHIQ")
-#: How a file begins, perhaps behind a block of its user; bytes that tell how long addresses are; and the class of a layout, behind its version.
+#: How a file begins, perhaps behind a block of its user; bytes up to the length of addresses; and a layout's class, behind its version.
 _SIGNATURE, _SUPERBLOCK, _VIRTUAL_LAYOUT = b"\x89HDF\r\n\x1a\n", 14, 3
 #: What the library raises on a broken file.
 _BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error)

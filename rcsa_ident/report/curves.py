@@ -11,7 +11,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.report.figures import _STYLE, COLOURS, _grid, _without_jumps, tooltip_frf
+from rcsa_ident.report.figures import _STYLE, COLOURS, _grid, _without_jumps, tooltip_frf, wide
 from rcsa_ident.report.lobes import _CURVES
 from rcsa_ident.report.summaries import entries_of
 from rcsa_ident.signals.recording import Quantity, Recording
@@ -40,7 +40,8 @@ def tip_figure(tip: Receptance, band: tuple[float, float] | None = None) -> Figu
         In which the machine is known; outside is shaded.
     """
     tip = _thinned(tip)
-    deviation, entries = _deviation(tip), entries_of(tip)
+    deviation = _deviation(tip)
+    entries = entries_of(tip, [c for c in tip.rows if not c.dof.is_slope])
     return tooltip_frf(
         to_hz(tip.omega),
         {name: tip.between(str(row), str(col)) for name, (row, col) in entries.items()},
@@ -102,7 +103,10 @@ def receptance_figure(receptance: Receptance, slopes: bool = False) -> Figure:
 
 def _thinned(receptance: Receptance) -> Receptance:
     """The same at no more frequencies than an eye resolves."""
-    places = np.arange(0, receptance.omega.size, max(receptance.omega.size // MOST_LINES, 1))
+    omega = receptance.omega
+    places = np.arange(0, omega.size, max(omega.size // MOST_LINES, 1))
+    if wide(omega):
+        places = np.unique(np.searchsorted(omega, np.geomspace(max(omega[0], 1e-6 * omega[-1]), omega[-1], 2 * MOST_LINES)))
     if isinstance(receptance, UncertainReceptance):
         return receptance.at_places(places)
     return Receptance(receptance.omega[places], receptance.values[places], receptance.rows, receptance.cols)

@@ -23,9 +23,14 @@ from rcsa_ident.identification.result import AxisResult, Identification, MetTest
 from rcsa_ident.units import to_hz
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
-COLOURS = {"X": "#0072B2", "Y": "#C8501A", "XY": "#009E73", "YX": "#AA4499"}
+COLOURS = {
+    "X": "#0072B2", "Y": "#C8501A", "Z": "#5D4FA2",
+    "XY": "#009E73", "YX": "#AA4499", "XZ": "#B8860B", "ZX": "#7F3C00", "YZ": "#56B4E9", "ZY": "#1F2933",
+}  # fmt: skip
 #: Share of the largest value below which curves across the planes, which pass through zero, are cut off.
 _LEAST_SHOWN = 3e-4
+#: Highest over lowest frequency, above which the scale is logarithmic.
+_WIDE = 200.0
 STAGES = {
     Stage.SEARCH: ("genetic search", "#9aa5b1"),
     Stage.REFINE: ("refined candidates", "#0072B2"),
@@ -237,7 +242,7 @@ def tooltip_frf(
     Parameters
     ----------
     frequency : array, shape (n,) [Hz]
-    tip : mapping of X, Y, XY (motion in X under a force in Y) or YX to complex array, shape (n,) [m/N]
+    tip : mapping of X, Y, Z, XY (motion in X under a force in Y) and the like to complex array, shape (n,) [m/N]
     deviation : mapping of the same names to (real, imaginary) standard deviations [m/N]
     truth : mapping of the same names to complex array, shape (n,) [m/N]
         The true one, where it is known.
@@ -245,15 +250,16 @@ def tooltip_frf(
         Band that was identified; what lies outside is shaded.
     """
     columns = list(dict.fromkeys("across" if len(name) > 1 else name for name in tip))
-    alike = "XY" in tip and "YX" in tip and np.allclose(tip["XY"], tip["YX"], rtol=0.0, atol=1e-6 * float(np.max(np.abs(tip["XY"]))))
+    reversed_ = {name: name[::-1] for name in tip if name < name[::-1] in tip}
+    alike = {a: b for a, b in reversed_.items() if np.allclose(tip[a], tip[b], rtol=0.0, atol=1e-6 * float(np.max(np.abs(tip[a]))))}
     figure, grid = _grid(2, len(columns), 4.8, (1.3, 1.0))
     with mpl.rc_context(_STYLE):
         for axis, value in tip.items():
-            if axis == "YX" and alike:
+            if axis in alike.values():
                 continue
             column = columns.index("across" if len(axis) > 1 else axis)
             top, bottom = grid[:, column]
-            name = "XY = YX" if alike and axis == "XY" else axis
+            name = f"{axis} = {alike[axis]}" if axis in alike else axis
             size, real = 1e6 * np.abs(value), 1e6 * value.real
             if axis in deviation:
                 std_real, std_imaginary = (1e6 * d for d in deviation[axis])
@@ -272,11 +278,12 @@ def tooltip_frf(
         for (top, bottom), name in zip(grid.T, columns, strict=True):
             for ax in (top, bottom):
                 _shade_outside(ax, frequency, band_hz, name != "across")
-            top.set_title("motion across the force: tooltip" if name == "across" else f"{name}: tooltip")
+            top.set_title("motion across the force" if name == "across" else f"{name}: tooltip")
             # receptances fall with frequency: that corner is free, and what is across is smaller everywhere
             top.legend(loc="upper right" if name == "across" else "lower left")
             bottom.set_xlabel("frequency [Hz]")
-            bottom.set_xlim(frequency[0], frequency[-1])
+            bottom.set_xscale("log" if wide(frequency) else "linear")
+            bottom.set_xlim(frequency[frequency > 0.0][0], frequency[-1])
         # the curves set the scale, not what is unknown outside the band
         all_sizes = 1e6 * np.abs(np.concatenate(list(tip.values())))
         all_real = 1e6 * np.concatenate(list(tip.values())).real
@@ -287,6 +294,11 @@ def tooltip_frf(
         grid[0, 0].set_ylabel("|C11|  [µm/N]")
         grid[1, 0].set_ylabel("real part [µm/N]")
     return figure
+
+
+def wide(frequency: FloatArray) -> bool:
+    """Say whether a scale in proportion would leave no room for the lowest modes: an arm's stand two decades below the tool's."""
+    return bool(frequency[-1] > _WIDE * frequency[0])
 
 
 def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float] | None, named: bool = True) -> None:

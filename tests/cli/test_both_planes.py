@@ -62,7 +62,8 @@ def result(tmp_path, turning):
 
 def test_tooltip_writes_what_is_across_and_says_its_speed(tmp_path, result, machine, turning):
     common = ("tooltip", result, tmp_path / "T1.toml", "--out", tmp_path / "F.csv", "--from", 400, "--to", 2500, "--step", 10)
-    text = run(*common).stdout
+    text = run(*common, "--plot", tmp_path / "F.png").stdout
+    assert (tmp_path / "F.png").read_bytes().startswith(b"\x89PNG")
     assert "XY: motion in X under a force in Y" in text
     assert ("9549 rev/min, the middle of the speeds that were cut" in text) is bool(turning)
     tip = machine.tip(by_hand.tooling(), OMEGA)

@@ -73,9 +73,12 @@ def test_check_in_words():
 
 
 def test_tip_is_written_with_its_cross_terms(tmp_path):
-    out = tmp_path / "FRF.csv"
-    found = run("robot", "tip", TX200, TOOL, "--posture", POSTURE, "--from", 5, "--to", 200, "--step", 0.5, "--out", out, "--json")
+    out, plot = tmp_path / "FRF.csv", tmp_path / "FRF.svg"
+    found = run(
+        "robot", "tip", TX200, TOOL, "--posture", POSTURE, "--from", 5, "--to", 200, "--step", 0.5, "--out", out, "--plot", plot, "--json"
+    )
     assert found.exit_code == 0, found.output
+    assert "frequency [Hz]" in plot.read_text(encoding="utf-8")
     told = json.loads(found.stdout)
     assert told["frequencies"] == 391
     header = out.read_text().splitlines()[0].split(",")
