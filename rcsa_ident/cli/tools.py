@@ -137,7 +137,8 @@ def holders(
     from rcsa_ident.tool_holder.catalogue import holder as made
 
     if taper is None:
-        rows = [{"chuck": each, "least_bore_mm": 1e3 * bores(each)[0], "largest_bore_mm": 1e3 * bores(each)[1]} for each in chucks()]
+        bored = {each: [round(1e3 * bore, 6) for bore in bores(each)] for each in chucks()}
+        rows = [{"chuck": each, "least_bore_mm": least, "largest_bore_mm": largest} for each, (least, largest) in bored.items()]
         if json_:
             emit({"tapers": list(tapers()), "chucks": rows})
             return
