@@ -67,6 +67,7 @@ STUDIES = (
     "formats",
     "format_examples",
     "fuzz",
+    "first_reader",
     "fuzz_api",
     "mutation",
     "physics_pictures",
