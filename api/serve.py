@@ -14,6 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import counted
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help="The web service; settings come from RCSA_IDENT_... too.")
 
@@ -137,7 +138,7 @@ def backup_store(
         account = backup(settings.data, file)
     except InputError as error:
         _fail(error)
-    typer.echo(f"{file}: {account.files} files, {account.bytes / 1e6:.1f} MB")
+    typer.echo(f"{file}: {counted(account.files, 'file')}, {account.bytes / 1e6:.1f} MB")
     for words, names in (("missing, though referred to", account.missing), ("not what was stored any more", account.damaged)):
         for name in names:
             typer.echo(f"warning: {name} is {words}", err=True)
@@ -155,7 +156,7 @@ def restore_store(
         account = restore(file, data)
     except InputError as error:
         _fail(error)
-    typer.echo(f"{data}: {account.files} files, {account.bytes / 1e6:.1f} MB")
+    typer.echo(f"{data}: {counted(account.files, 'file')}, {account.bytes / 1e6:.1f} MB")
 
 
 def _crew(identifications: int, lobes: int, paths: int) -> list[Callable[[Any, Callable[[], None], Event], None]]:

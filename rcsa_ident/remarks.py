@@ -44,3 +44,12 @@ class Remark(str):
 def says(remarks: Iterable[Remark], code: StrEnum) -> bool:
     """Return whether one of the remarks has this code."""
     return any(remark.code is code for remark in remarks)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return how many of something there are.
+
+    >>> counted(1, "file"), counted(2, "file")
+    ('1 file', '2 files')
+    """
+    return f"{number} {noun}" + ("" if number == 1 else "s")

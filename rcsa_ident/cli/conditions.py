@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcsa_ident.cli.options import CutOptions, DriveOptions, SpeedOptions, Stock, Strategy, TipOptions
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import counted
 from rcsa_ident.units import from_rpm, inclusive
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
     if not fewest <= len(files) <= highest:
         machine_first = "RESULT.json or FLANGE.csv, then TOOLING.toml (or --modes or --frf and TOOLING.toml)"
         wanted = "TOOLING.toml alone with --modes or --frf" if own_tip else machine_first
-        raise InputError("files", f"{len(files)} files", wanted)
+        raise InputError("files", counted(len(files), "file"), wanted)
     lengths = None if stickouts is None else [mm * 1e-3 for mm in numbers(stickouts, "--stickout-mm", "mm")]
     paths = files if own_tip else files[1:]
     if own_tip:

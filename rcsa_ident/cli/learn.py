@@ -13,6 +13,7 @@ from rcsa_ident.cli.options import CutOptions, StiffnessSpread, TipOptions, take
 from rcsa_ident.cli.processes import Processes
 from rcsa_ident.errors import InputError
 from rcsa_ident.processes import workers
+from rcsa_ident.remarks import counted
 from rcsa_ident.stability.methods import MethodName
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def learn(
 
     if toolings is not None:
         if tests is not None or len(files) != 2:
-            found = "--tests, too" if tests is not None else f"{len(files)} files"
+            found = "--tests, too" if tests is not None else counted(len(files), "file")
             raise InputError("--toolings", found, "RESULT.json and the folder of a campaign, without --tests")
         new = New(toolings, machine, overwrite, json_)
         if taps:
@@ -167,7 +168,7 @@ def believed_of(
             if alone
             else "RESULT.json, MODES.toml or LEARNT.json, then TOOLING.toml (or --modes or --frf and TOOLING.toml)"
         )
-        raise InputError("files", f"{len(files)} files", wanted)
+        raise InputError("files", counted(len(files), "file"), wanted)
     modes = tip.modes if tip.modes is not None else files[0] if not alone and files[0].suffix.lower() == ".toml" else None
     if modes is not None:
         found = read_modes_file(modes)

@@ -16,6 +16,7 @@ from rcsa_ident.cli.options import TipOptions, takes_groups
 from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
 from rcsa_ident.cli.robot import is_robot, posed_robot
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.remarks import counted
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.units import from_rpm
 
@@ -162,7 +163,9 @@ def _subjects(files: list[Path], tip: TipOptions, posture: str | None) -> tuple[
     from rcsa_ident.io.setups import read_tooling
 
     if len(files) < 2:
-        raise InputError("files", f"{len(files)} files", "a machine, a tooling and a path; with --modes or --frf a tooling and a path")
+        raise InputError(
+            "files", counted(len(files), "file"), "a machine, a tooling and a path; with --modes or --frf a tooling and a path"
+        )
     *subjects, path = files
     robot = len(subjects) == 2 and is_robot(subjects[0])
     if robot != (posture is not None):

@@ -9,6 +9,7 @@ import typer
 
 from rcsa_ident.cli.common import BAD_INPUT, Json, answers, emit, say, warn, writable
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import counted
 
 if TYPE_CHECKING:
     from rcsa_ident.io.tool_libraries import Imported
@@ -91,7 +92,7 @@ def import_tools(
     else:
         _show(entries)
         if out is not None:
-            say(f"written: {len(paths)} toolings to {out}; each begins with its assumptions")
+            say(f"written: {counted(len(paths), 'tooling')} to {out}; each begins with its assumptions")
     if not made:
         if not json_:
             warn("no tool of the library could be imported")

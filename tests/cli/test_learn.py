@@ -255,7 +255,7 @@ def test_bad_input_is_one_sentence(shop, name, old, new, words):
     [
         (
             ("learn", "T.toml", "--tests", "C.csv", "--out", "L.json"),
-            "files: found 1 files, allowed is RESULT.json, MODES.toml or LEARNT.json",
+            "files: found 1 file, allowed is RESULT.json, MODES.toml or LEARNT.json",
         ),
         (("lobes", "--modes", "M.toml", "T.toml", "--out", "L.csv", "--tests-out", "P.csv"), "--tests-out: found"),
         (("advise", "--modes", "M.toml", "T.toml", "--among", "C.csv"), "--among: found"),
