@@ -186,13 +186,17 @@ def test_planes_of_an_upright_tool_beside_a_wall(seed):
     """All planes, or the first, the last and every so many between; the engagement ends with the material, the edge, or half way on."""
     rng = np.random.default_rng(seed)
     solid = (FLAT, BALL, LOLLIPOP)[seed % 3]
-    field = DexelField.block([0.0, 0.0, 0.0], [0.012, 0.011, 0.0029], 0.35e-3)
+    field = DexelField.block([0.0, 0.0, 0.0], [0.012, 0.011, 0.0032], 0.35e-3)
+    foot, top = rng.uniform(0.0, 0.0004), rng.uniform(0.0025, 0.0032)
+    height = field.lattice[0, 2] + field.cell[2] * np.arange(field.shape[2])
+    field.segs[2][:, :, 0] = foot, top
+    for count in field.counts[:2]:
+        count[(height < foot) | (height > top)] = 0
     turn, side, beside = rng.uniform(0.0, TURN), (-1) ** seed, rng.uniform(1.05e-3, 1.4e-3)
     way = np.array([np.cos(turn), np.sin(turn)])
     centre, left = rng.uniform(0.0052, 0.0058, 2), side * np.array([-way[1], way[0]])
     tip, most, edge = rng.uniform(-0.0015, 0.0012), (100, 4)[seed % 2], 0.0021 if seed > 5 else solid.edge
-    z = field.lattice[0, 2] + field.cell[2] * np.arange(field.shape[2]) - tip
-    z = z[(z >= max(-tip, 0.0)) & (z <= edge)]
+    z = height[(height >= max(foot, tip)) & (height <= min(top, tip + edge))] - tip
     every = max((z.size - 1) // (most - 1), 1)
     z = np.append(z[:-1:every], z[-1])
     radii = np.interp(z, solid.heights, solid.radii)
@@ -204,7 +208,7 @@ def test_planes_of_an_upright_tool_beside_a_wall(seed):
         Sweep(field, tool, ToolPath(np.column_stack([ends, [height, height]]))).run()
     tips = np.array([[*centre, tip], [*(centre + 5e-5 * way), tip]])
     outline = np.stack([solid.heights, solid.radii])
-    extent = np.array([max(-tip, 0.0), min(0.0029 - tip, edge)])
+    extent = np.array([max(foot - tip, 0.0), min(top - tip, edge)])
     if not seed % 2:
         # beyond the field there are no planes
         extent += [-9e-4, 9e-4 * (edge == solid.edge)]
@@ -217,8 +221,8 @@ def test_planes_of_an_upright_tool_beside_a_wall(seed):
     assert rows[:found, 1:] == pytest.approx(wanted, abs=1e-6)
     half = 0.5 * every * field.cell[2]
     below, above = z[0] == cuts[0], z[-1] == cuts[-1]
-    assert extent[0] == pytest.approx(max(-tip, 0.0) if below else cuts[0] - half)
-    assert extent[1] == pytest.approx(min(0.0029 - tip, edge) if above else cuts[-1] + half)
+    assert extent[0] == pytest.approx(max(foot - tip, 0.0) if below else cuts[0] - half)
+    assert extent[1] == pytest.approx(min(top - tip, edge) if above else cuts[-1] + half)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -236,6 +240,8 @@ def test_a_tool_that_leaves_a_block_by_any_side(seed):
         centre[axis] = (high if up else low)[axis] - normal[axis] * share * radius
         side = np.arctan2(normal[:2] @ way[:2], normal[1] * way[0] - normal[0] * way[1])
         segs, counts = half_space(lattice, shape, np.zeros(3), 1.0, [*centre, radius])
+        # a third of the lines begin later and end earlier
+        segs[2][rng.random(counts[2].shape) < 0.3] = [[-0.1e-3, 1.1e-3], [0.0, 0.0]]
         expected = arcs_in(side, 0.0, share)
         beside = np.abs(expected.ravel() - np.pi * np.round(expected.ravel() / np.pi))
         if np.any(np.diff(expected)[:, 0] < 0.6) or np.any((beside > 1e-9) & (beside < 0.3)):
@@ -248,7 +254,7 @@ def test_a_tool_that_leaves_a_block_by_any_side(seed):
         for k, plane in enumerate(np.split(rows[:found], 3)):
             assert plane[:, 0] == pytest.approx(1e-3 + k * 0.5e-3)
             assert ordered(plane[:, 1:]) == pytest.approx(expected, abs=0.04)
-        assert not found or extent == pytest.approx([0.75e-3, 2.25e-3])
+        assert extent == pytest.approx([0.75e-3, 2.25e-3] if found else [np.inf, -np.inf])
     assert compared
 
 

@@ -171,3 +171,22 @@ def test_columns_beside_islands(seed: int) -> None:
                 foot = top + np.argmin(inside[top:])
                 assert tops[side, i] == pytest.approx(-y[top], abs=5e-4)
                 assert feet[side, i] == pytest.approx(max(-y[foot], -3.0), abs=5e-4)
+
+
+def test_the_highest_of_many_pieces_lies_over_a_column() -> None:
+    rng = np.random.default_rng(3)
+    pieces = np.concatenate([rng.uniform(0.3, 1.7, (40, 1)), rng.uniform(-0.9, 0.9, (40, 1))], axis=1)
+    pieces = np.concatenate([pieces, pieces + rng.uniform(-0.2, 0.2, (40, 2))], axis=1)
+    start, spacing, tops = 0.05, 0.0173, rng.uniform(-0.8, -0.3, (2, 90))
+    wanted = tops.copy()
+    x = start + spacing * np.arange(90)
+    for side, sign in enumerate((-1.0, 1.0)):
+        over = np.full(90, -np.inf)
+        for xa, ya, xb, yb in pieces:
+            there = (x >= min(xa, xb)) & (x <= max(xa, xb))
+            y = ya + (yb - ya) * (x - xa) / (xb - xa)
+            there &= sign * y > 0.0
+            over[there] = np.maximum(over[there], -np.abs(y[there]))
+        wanted[side] = np.where(over > NOTHING, over, wanted[side])
+    kernels.overlay(pieces, start, spacing, NOTHING, tops)
+    assert tops == pytest.approx(wanted, abs=1e-12)
