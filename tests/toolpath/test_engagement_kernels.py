@@ -277,3 +277,14 @@ def test_ribs_in_front_are_an_arc_each():
         found = slice_arcs(*given, np.array([1.0, 0.0, 0.0]), 0.0, arcs)
         assert found == min(room, 3)
         assert arcs[:found] == pytest.approx(np.array(wanted[:found]), abs=1e-9)
+
+
+def test_ends_beside_a_tool_on_the_border_of_the_lattice():
+    """Far enough around it, lines are looked for one ring after the other; beyond the border there are none, whichever side it is."""
+    lattice, arcs = np.array([[0.0, 0.001, 0.0], [1e-3, 0.8e-3, 1e-3]]), np.array([[0.0, TURN], [0.3, 0.4]])
+    seg, count = np.tile([[-0.5, 0.5], [2.0, 3.0]], (7, 6, 1, 1)), np.full((7, 6), 2)
+    for x, y in np.ndindex(9, 8):
+        circle = np.array([(x - 1) * 1e-3, 0.001 + (y - 1) * 0.8e-3, 1e-3])
+        for z, wanted in ((0.2, (-0.5, 0.5)), (2.5, (2.0, 3.0)), (1.0, (np.nan, np.nan))):
+            ends = [kernels._end_beside(seg, count, lattice, z, circle, np.eye(2), arcs, 1, which) for which in range(2)]
+            assert ends == pytest.approx(wanted, nan_ok=True)
