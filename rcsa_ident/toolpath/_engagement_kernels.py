@@ -436,7 +436,7 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, most, rows,
     """
     low, high = extent
     arcs, last_arcs, held, planes = np.empty((16, 2)), np.empty((16, 2)), 0, 0
-    top, last_found, last_radius = 0.0, 0, 0.0
+    top, beyond, last_found, last_radius = 0.0, 0.0, 0, 0.0
     circle, cut_from = np.empty(3), np.empty(3)
     frame = level_frame(feed)
     tip, cell = tips[1, 2], lattice[1, 2]
@@ -465,11 +465,12 @@ def engage_upright(segs, counts, lattice, tips, outline, edge, feed, most, rows,
         if z - tip < extent[0]:
             end = _end_beside(segs[2], counts[2], lattice, z, circle, frame, arcs, found, 0)
             extent[0] = (end if end > z - step else z - 0.5 * step) - tip if max(z - step, end) > tip else 0.0
-        top, last_found, last_radius = z, found, radius
+        # behind the last plane there is none that says whether the arcs go on
+        top, beyond, last_found, last_radius = z, z + step if k < last else np.inf, found, radius
         for each in range(found):
             last_arcs[each, 0], last_arcs[each, 1] = arcs[each, 0], arcs[each, 1]
     if held:
         circle[2] = last_radius
         end = _end_beside(segs[2], counts[2], lattice, top, circle, frame, last_arcs, last_found, 1)
-        extent[1] = min((end if end < top + step else top + 0.5 * step) - tip, edge)
+        extent[1] = min((end if end < beyond else top + 0.5 * step) - tip, edge)
     return held if planes else -1

@@ -53,12 +53,9 @@ def contour(layer, window, out):
     dx, dy = layer.lattice[1, 0], layer.lattice[1, 1]
     found = 0
     ends = np.empty((4, 2))
-    for i in range(max(window[0], -1), min(window[1], nx) + 1):
-        for j in range(max(window[2], -1), min(window[3], ny) + 1):
-            if i == nx or j == ny:
-                continue
+    for i in range(max(window[0], -1), min(window[1], nx - 1) + 1):
+        for j in range(max(window[2], -1), min(window[3], ny - 1) + 1):
             # corners counterclockwise: (i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)
-            here = False
             state = 0
             for c in range(4):
                 a, b = i + (1 if c in (1, 2) else 0), j + (1 if c >= 2 else 0)
@@ -76,20 +73,13 @@ def contour(layer, window, out):
                 one, two = (state >> c) & 1, (state >> ((c + 1) % 4)) & 1
                 if one == two:
                     continue
+                # a side beside the field has two empty corners
                 if c % 2 == 0:
-                    row = j + c // 2
-                    low = x0 + i * dx
-                    place = 0.5 * dx + low
-                    if 0 <= row < ny:
-                        place = _crossing(layer.along_x[row], layer.count_x[row], low, low + dx)
-                    ends[cut, 0], ends[cut, 1] = place, y0 + row * dy
+                    row, low = j + c // 2, x0 + i * dx
+                    ends[cut, 0], ends[cut, 1] = _crossing(layer.along_x[row], layer.count_x[row], low, low + dx), y0 + row * dy
                 else:
-                    row = i + (1 if c == 1 else 0)
-                    low = y0 + j * dy
-                    place = 0.5 * dy + low
-                    if 0 <= row < nx:
-                        place = _crossing(layer.along_y[row], layer.count_y[row], low, low + dy)
-                    ends[cut, 0], ends[cut, 1] = x0 + row * dx, place
+                    row, low = i + (1 if c == 1 else 0), y0 + j * dy
+                    ends[cut, 0], ends[cut, 1] = x0 + row * dx, _crossing(layer.along_y[row], layer.count_y[row], low, low + dy)
                 cut += 1
             for p in range(0, cut, 2):
                 if found < out.shape[0]:

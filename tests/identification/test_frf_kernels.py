@@ -102,6 +102,23 @@ def test_cross_frf_is_that_of_coupled_complex_modes(m, soft):
         np.testing.assert_allclose(alone[:, 0], both[:, 1], rtol=1e-10, atol=1e-12 * np.abs(alone).max())
 
 
+@pytest.mark.parametrize("soft", [False, True])
+def test_a_spindle_that_stands_still_is_another_machine(soft):
+    """Its natural frequencies are higher by one share, its damping by another; lines at speed stay as they are."""
+    rng = np.random.default_rng(5)
+    omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 12)
+    _, flange, tip = substructure(rng, omega)
+    omega_n, psi, factor, softening, residual, joint = candidate(rng, 3, soft)
+    whole = omega_n, psi, factor, softening, residual, np.append(joint, [0.06, -0.3])
+    stiff = omega_n * 1.06, psi, factor * np.sqrt(0.7), softening, residual, joint
+    at_speed = omega_n, psi, factor, softening, residual, joint
+    hammer = np.zeros((12, 3))
+    still = hit(omega)[1] > 0.0
+    found, *others = (cross(each, omega, flange, tip, "gap and fixture", x=0.4, hammer=hammer) for each in (whole, stiff, at_speed))
+    expected = np.where(still[:, None], *others)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
 def test_nothing_softens_at_the_middle_speed():
     rng = np.random.default_rng(4)
     omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 9)

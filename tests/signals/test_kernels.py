@@ -102,6 +102,26 @@ def test_runs_go_on_across_blocks(kernel):
     np.testing.assert_array_equal(front[1:4], [[0.0, 3.0, 1.0], [4.0, 3.0, 2.5], [0.0, 0.0, 0.0]])
 
 
+@pytest.mark.parametrize("kernel", compiled_and_plain("follow_runs"))
+def test_runs_of_a_fine_signal(kernel):
+    """Nearly every sample is a run of its own; some stand still for two to twelve."""
+    rng = np.random.default_rng(8)
+    length = np.where(rng.random(200) < 0.1, rng.integers(2, 13, 200), 1)
+    level = rng.normal(size=200)
+    x = np.repeat(level, length)
+    values = np.array([np.inf, np.inf, -np.inf, -np.inf, np.nan, np.inf, np.nan])
+    counts, lengths, levels, front = np.zeros(14, dtype=np.int64), np.zeros(8, dtype=np.int64), np.zeros(5), np.zeros((9, 3))
+    for start in range(0, x.size, 37):
+        kernel(x[start : start + 37], start, values, counts, lengths, levels, front)
+    _kernels.end_run(-1.0, values, counts, lengths, levels, front)
+    np.testing.assert_array_equal(lengths, np.bincount(np.minimum(length, 7), minlength=8))
+    order = np.sort(level)
+    np.testing.assert_array_equal(values, [order[0], order[1], order[-1], order[-2], level[-1], np.abs(np.diff(level)).min(), level[0]])
+    assert counts[12] == 5
+    assert counts[13] == length.max()
+    np.testing.assert_array_equal(np.sort(levels), np.sort(level[:5]))
+
+
 def turning(n):
     """An angle that speeds up."""
     t = np.arange(n)
@@ -150,7 +170,7 @@ def teeth_of_a_comb(gain, place, most, folded):
 @pytest.mark.parametrize("folded", [False, True])
 @pytest.mark.parametrize("kernel", compiled_and_plain("comb_scores"))
 def test_comb_scores(kernel, folded):
-    gain, place = np.random.default_rng(6).normal(size=(3, 120)), np.array([7.3, 19.9, 33.3, 70.2])
+    gain, place = np.random.default_rng(6).normal(size=(3, 120)), np.array([2.0, 7.3, 19.9, 33.3, 58.25, 70.2, 117.0])
     expected = [[teeth_of_a_comb(row, each, 12, folded) for each in place] for row in gain]
     np.testing.assert_allclose(kernel(gain, place, 12, folded), expected, atol=1e-12)
 

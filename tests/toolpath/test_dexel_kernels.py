@@ -16,6 +16,8 @@ CHORD = 1e-5
 FLAT = ToolSolid.of(Cutter(2, 0.004), 0.02)
 BALL = ToolSolid.of(Cutter(2, 0.004, profile=Profile.ball(0.004)), 0.02, CHORD)
 LOLLIPOP = ToolSolid.of(Cutter(2, 0.004, profile=Profile.lollipop(0.004, 0.002)), 0.02, CHORD)
+SHORT = ToolSolid.of(Cutter(2, 0.004, profile=Profile.ball(0.004)), 0.0024, CHORD)
+CONE = ToolSolid.of(Cutter(2, 0.004, profile=Profile.tapered(0.004, 0.5, 0.0005, 0.0023)), 0.0023, CHORD)
 UP = np.array([[0.0, 0.0, 1.0]] * 2)
 LEANING = np.array([[0.3, 0.1, 1.0], [0.1, -0.2, 1.0]])
 
@@ -97,6 +99,22 @@ def test_a_line_through_a_piece_of_a_cone():
             assert high - low < 2e-3
 
 
+@pytest.mark.parametrize("aside", [0.0, 0.3, -0.4])
+def test_a_line_along_the_side_of_a_cone(aside):
+    """The square of the way drops out where a line leans as the side does; through the apex all of it does."""
+    share = np.linspace(-4.0, 4.0, 20001)
+    for slope, sign in ((0.5, 1.0), (0.5, -1.0), (-0.5, 1.0)):
+        way = np.array([abs(slope), 0.0, sign]) / np.hypot(slope, 1.0)
+        for x in (-0.8, -0.3, 0.0, 0.45, 1.4):
+            low, high = frustum_on_line(x, aside, 0.1, *way, 0.0, 0.6, 0.7, 0.6 + 0.7 * slope)
+            place = np.array([x, aside, 0.1])[:, None] + share * way[:, None]
+            inside = (place[2] >= 0.0) & (place[2] <= 0.7) & (np.hypot(place[0], place[1]) <= 0.6 + slope * place[2])
+            if np.any(inside):
+                assert (low, high) == pytest.approx((share[inside][0], share[inside][-1]), abs=1e-3)
+            else:
+                assert high - low < 2e-3
+
+
 @pytest.mark.parametrize(
     ("solid", "move", "axes"),
     [
@@ -107,17 +125,33 @@ def test_a_line_through_a_piece_of_a_cone():
         (BALL, [[0.003, 0.002, 0.005], [0.003, 0.002, 0.001]], UP),
         (LOLLIPOP, [[0.001, 0.002, 0.001], [0.006, 0.002, 0.001]], UP),
         (LOLLIPOP, [[0.003, 0.002, 0.003], [0.003, 0.002, 0.001]], UP),
+        (FLAT, [[0.006, 0.002, 0.003], [0.003, 0.001, 0.003], [-0.001, 0.004, 0.003]], UP),
+        (SHORT, [[-0.001, -0.001, 0.0015], [0.006, 0.0045, 0.0005]], UP),
+        (SHORT, [[0.007, -0.001, 0.0005], [0.001, 0.0045, 0.0015]], UP),
+        (CONE, [[0.003, 0.001, 0.0026], [0.006, 0.0015, 0.0021]], UP),
         (FLAT, [[0.001, 0.002, 0.003], [0.004, 0.003, 0.003]], LEANING),
         (LOLLIPOP, [[0.001, 0.002, 0.001], [0.003, 0.003, 0.0015]], LEANING),
     ],
 )
 def test_what_is_left_is_what_no_place_of_the_tool_holds(solid, move, axes):
     """On all three grids, but for points nearer to the surface than steps and chords tell."""
-    move = np.array(move)
-    field = DexelField.block([0.0, 0.0, 0.0], [0.008, 0.005, 0.004], 0.7e-3)
-    path = ToolPath(move, axes=axes)
+    shift = np.array([0.013, 0.006, -0.021])
+    move = np.array(move) + shift
+    field = DexelField.block(shift, shift + np.array([0.008, 0.005, 0.004]), 0.7e-3)
+    path = ToolPath(move, axes=axes[[0] * (len(move) - 1) + [1]])
+    full = field.copy()
     tolerance = 5e-5
-    Sweep(field, solid, path, tolerance=tolerance).run()
+    sweep = Sweep(field, solid, path, tolerance=tolerance)
+    sweep.run()
+    changed = 0
+    for grid in range(3):
+        left = np.where(np.arange(field.segs[grid].shape[2]) < field.counts[grid][..., None], np.diff(field.segs[grid])[..., 0], 0.0).sum(
+            axis=2
+        )
+        taken = np.diff(full.segs[grid])[..., 0].sum(axis=2) - left
+        assert sweep.told[:, grid].sum() == pytest.approx(taken.sum())
+        changed += np.count_nonzero(taken > 1e-12)
+    assert sweep.updates >= changed
     tips = along(move, 300)
     ways = along(path.axes, 300)
     ways /= np.linalg.norm(ways, axis=1)[:, None]

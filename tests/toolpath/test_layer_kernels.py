@@ -57,18 +57,17 @@ def heights_of_material(seg, count, lattice, tip, outline, edge):
 def test_material_ahead_is_what_a_plain_search_finds(kind, seed):
     """Lines with gaps at any heights, a tool that stands anywhere, also half beside the block."""
     rng = np.random.default_rng(seed)
-    field = DexelField.block([0.001, -0.002, 0.0], [0.016, 0.008, 0.01], np.array([0.8e-3, 0.5e-3, 0.5e-3])[seed % 2])
-    seg, count = np.zeros((*field.shape[:2], 2, 2)), rng.integers(0, 3, field.shape[:2])
-    bounds = np.sort(rng.uniform(0.0, 0.01, (*field.shape[:2], 4)), axis=2)
-    seg[:] = bounds.reshape(*field.shape[:2], 2, 2)
+    lattice = np.array([[0.0014, -0.0018, 0.0], [[0.8e-3, 0.6e-3, 0.4e-3], [0.5e-3, 0.7e-3, 0.9e-3]][seed % 2]])
+    shape = (19, 17)
+    seg, count = np.sort(rng.uniform(0.0, 0.01, (*shape, 4)), axis=2).reshape(*shape, 2, 2), rng.integers(0, 3, shape)
     # little of it, so that the range has ends inside of the edge
-    count[rng.random(count.shape) < 0.97] = 0
+    count[rng.random(count.shape) < 0.96] = 0
     ranges = 0
     for _ in range(6):
         tip = np.array([rng.uniform(-0.003, 0.018), rng.uniform(-0.006, 0.012), rng.uniform(-0.003, 0.008)])
         edge = rng.uniform(0.003, 0.011)
-        low, high = material_ahead(seg, count, field.lattice, tip, OUTLINES[kind], edge)
-        expected = heights_of_material(seg, count, field.lattice, tip, OUTLINES[kind], edge)
+        low, high = material_ahead(seg, count, lattice, tip, OUTLINES[kind], edge)
+        expected = heights_of_material(seg, count, lattice, tip, OUTLINES[kind], edge)
         if expected.size == 0:
             # what the scale steps over is no range to speak of
             assert high - low < 2e-5
@@ -100,3 +99,49 @@ def test_arcs_in_front_of_a_slot_in_a_layer(turn):
     assert radius * np.cos(arcs[:2]) == pytest.approx(expected, abs=0.3e-3)
     # without room for the second one, the first is told
     assert layer_arcs(seg, count, lattice, centre, radius, feed, arcs[:1]) == 1
+
+
+def arcs_by_lines(held, lattice, centre, radius, feed):
+    """Every line of a lattice is asked, in the complex plane; where the circle meets it, and half way to its neighbours."""
+    place = (
+        lattice[0, 0] + lattice[1, 0] * np.arange(held.shape[0])[:, None] + 1j * (lattice[0, 1] + lattice[1, 1] * np.arange(held.shape[1]))
+    )
+    place = (place - complex(*centre[:2])) * complex(*feed).conjugate() / radius
+    wide = max(lattice[1, :2]) / radius
+    with np.errstate(invalid="ignore"):
+        way = place.real - np.sqrt(1.0 - place.imag**2)
+    met = (way > 0.0) & (way <= 1.5 * wide)
+    angle, held = np.arccos(place.imag[met]), held[met]
+    order = np.argsort(angle)
+    angle, held = angle[order], held[order]
+    middles = np.concatenate([[0.0], 0.5 * (angle[1:] + angle[:-1]), [np.pi]])
+    found = []
+    for start, stop in zip(middles[:-1][held], middles[1:][held], strict=True):
+        if found and start - found[-1][1] < wide / max(np.sin(start), 0.2):
+            found[-1][1] = stop
+        else:
+            found.append([start, stop])
+    return np.reshape(found, (-1, 2))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_arcs_of_a_layer_are_those_of_all_its_lines(seed):
+    """A tool anywhere over a small field, half beside it, too, with ribs that turn with it."""
+    rng = np.random.default_rng(seed)
+    lattice = np.array([[0.001, -0.002, 0.0], [[0.4e-3, 0.3e-3, 0.5e-3], [0.25e-3, 0.35e-3, 0.2e-3]][seed % 2]])
+    shape, radius, numbers = np.array([24, 21]), 0.003, set()
+    for _ in range(6):
+        corner = lattice[0, :2] + lattice[1, :2] * (shape - 1)
+        centre = np.array([*rng.uniform(lattice[0, :2] - 0.002, corner + 0.002), 0.001])
+        turn, period = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(1e3, 6e3)
+        feed = np.array([np.cos(turn), np.sin(turn)])
+        x, y = (lattice[0, k] + lattice[1, k] * np.arange(shape[k]) - centre[k] for k in range(2))
+        held = np.sin(period * (y * feed[0] - x[:, None] * feed[1]) + rng.uniform(0.0, 6.0)) > -0.3
+        # below what is looked at all have material, above it none
+        seg, count = np.zeros((*shape, 2, 2)), np.where(held, 2, 1)
+        seg[:, :, 0], seg[:, :, 1] = [0.0, 0.0008], [0.0009, 0.0012]
+        arcs = np.empty((20, 2))
+        found = layer_arcs(seg, count, lattice, centre, radius, feed, arcs)
+        numbers.add(found)
+        assert arcs[:found] == pytest.approx(arcs_by_lines(held, lattice, centre, radius, feed), abs=1e-12)
+    assert len(numbers) > 1

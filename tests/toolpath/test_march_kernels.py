@@ -45,6 +45,38 @@ def test_a_ray_straight_down_and_one_from_within() -> None:
     # a tool whose very centre lies in the material cuts along its whole radius
     assert kernels.chip(wall, foot, 0.0, 1e-4, 0.005, -0.004, 0.0, -1.0, 0.002) == pytest.approx(0.002)
     assert kernels.chip(wall, foot, 0.0, 1e-4, 0.5, 0.0, 0.0, -1.0, 0.005) == 0.0
+    # columns end with their last one, and nothing is known beyond it, nor before the first
+    for place, wanted in ((-1e-5, 0.0), (1e-5, 0.002), (98.9e-4 / 100 * 99, 0.002), (98.99e-4, 0.002), (99.01e-4, 0.0)):
+        assert kernels.chip(wall, foot, 0.0, 1e-4, place, 0.0, 0.0, -1.0, 0.005) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_force_is_that_of_edges_along_their_own_axes(seed: int) -> None:
+    """Two flat walls, cones of any lean: what a ray cuts off in closed form, and forces along the edge's three axes by cross products."""
+    random = np.random.default_rng(seed)
+    lean = random.uniform(-1.0, 1.0, (3, 2))
+    edges = np.stack([random.uniform(0.004, 0.006, (3, 2)), np.cos(lean), np.sin(lean), random.uniform(1e-4, 1e-3, (3, 2))], axis=-1)
+    cut = random.uniform(1.0, 5.0, 6) * [1e8, 1e8, 1e8, 1e3, 1e3, 1e3]
+    wall = random.uniform(-0.003, -0.001, (2, 2))
+    columns = kernels.Columns(np.tile(wall[..., None], 400), np.full((2, 2, 400), NOTHING), -0.01, 5e-5)
+    angle, place = random.uniform(0.0, 2.0 * np.pi, (3, 2)), random.uniform(-2e-4, 2e-4, 3)
+    turned = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    force, chips, wanted = np.full(3, 9.0), np.empty((3, 2)), np.zeros(3)
+    kernels.cut_force(columns, kernels.Teeth(edges, angle, cut), tuple(place), turned, chips, force)
+    for j in range(3):
+        for k in range(2):
+            (radius, upright, leaning, width), (s, c) = edges[j, k], turned[j, k]
+            side = 0 if c < 0.0 else 1
+            # from the centre to the wall along the ray
+            clear = ((-1.0) ** side * place[1] - wall[side, k]) / abs(c)
+            thick = max(radius - place[2] * np.tan(lean[j, k]) - clear, 0.0)
+            assert chips[j, k] == pytest.approx(thick, abs=1e-15)
+            if thick > 0.0:
+                along, normal = np.array([-c, s, 0.0]), np.array([upright * s, upright * c, -leaning])
+                strength = width * (cut[:3] * thick * upright + cut[3:])
+                wanted += strength[0] * along - strength[1] * normal + strength[2] * np.cross(along, normal)
+    assert force == pytest.approx(wanted)
+    assert np.any(chips > 0.0)
 
 
 def test_an_edge_takes_columns_down_to_its_way_and_never_up() -> None:
@@ -78,6 +110,29 @@ def test_above_the_path_what_the_ray_has_not_swept_stays() -> None:
     assert np.flatnonzero(walls[1] < 0.0)[-1] == 35
 
 
+@pytest.mark.parametrize("room", [2, 3, 9, 300])
+def test_walls_are_taken_down_to_all_that_an_edge_has_passed(room: int) -> None:
+    """Turn by turn, the upper wall a while later: in the end both are as if each stretch had been taken off at once."""
+    random = np.random.default_rng(room)
+    walls, wanted = np.full((2, 160), 0.0), np.full((2, 160), 0.0)
+    trail, held = np.zeros((room, 2)), np.zeros(1, dtype=np.int64)
+    angle = np.cumsum(random.uniform(0.02, 0.3, 150))
+    way = np.stack([0.008 + 1e-5 * angle + 0.004 * np.sin(angle), 0.003 * np.cos(angle)], axis=1)
+    for t, (x, y) in enumerate(way):
+        kernels.place_edge(walls, 0.0, 1e-4, x, y, 0.0, x - random.uniform(0.0, 0.002), trail, held)
+        assert 1 <= held[0] <= room
+        assert trail[held[0] - 1].tolist() == [x, y]
+        if t:
+            (a, b), (c, d) = way[t - 1], way[t]
+            for side, sign in enumerate((1.0, -1.0)):
+                if min(sign * b, sign * d) < 0.0:
+                    kernels.erase(wanted[side], 0.0, 1e-4, a, sign * b, c, sign * d)
+    assert np.array_equal(walls[0], wanted[0])
+    assert np.all(walls[1] >= wanted[1])
+    kernels.place_edge(walls, 0.0, 1e-4, *way[-1], 0.0, np.inf, trail, held)
+    assert np.array_equal(walls[1], wanted[1])
+
+
 def test_a_march_is_that_of_the_full_equations() -> None:
     """Two freedoms, one with play, and a mode: every instant's equations by brute force, with the force of `cut_force` in both."""
     step, count, radius = 2e-5, 120, 0.005
@@ -95,9 +150,9 @@ def test_a_march_is_that_of_the_full_equations() -> None:
     inverse = np.linalg.inv(mass + 0.5 * step * damping + 0.25 * step**2 * np.diag(stiffness))
     springs = kernels.Springs(inverse, damping, stiffness, load, motion, zero, play)
     teeth = kernels.Teeth(
-        np.array([[[radius, 1.0, 0.0, 1e-3]], [[radius, 1.0, 0.0, 1e-3]]]),
+        np.array([[[radius, 0.8, 0.6, 1e-3]], [[radius, 0.96, -0.28, 1e-3]]]),
         np.array([[0.0], [np.pi]]),
-        np.array([7e8, 3e8, 0.0, 1e4, 5e3, 0.0]),
+        np.array([7e8, 3e8, 1e8, 1e4, 5e3, 2e3]),
     )
 
     def columns() -> kernels.Columns:
@@ -133,7 +188,12 @@ def test_a_march_is_that_of_the_full_equations() -> None:
         assert forces[t] == pytest.approx(force, abs=1e-6)
         assert tips[t] == pytest.approx(tip, abs=1e-13)
         for j in range(2):
-            x, y = course[t, 1:] + tip[:2] + radius * turned[j, 0]
+            own = radius - tip[2] * teeth.edges[j, 0, 2] / teeth.edges[j, 0, 1]
+            x, y = course[t, 1:] + tip[:2] + own * turned[j, 0]
             swept = x - chips[j, 0] * turned[j, 0, 0] if turned[j, 0, 1] > 0.0 else np.inf
             kernels.place_edge(other.tops[:, 0], -0.01, 5e-5, x, y, course[t, 2] + tip[1], swept, there.trail[j, 0], there.held[j])
     assert went.state == pytest.approx(np.array([q, v, a]), rel=1e-6, abs=1e-12)
+    # what is left of both walls
+    assert cut.tops == pytest.approx(other.tops, abs=1e-11)
+    assert np.all(np.any(cut.tops < -0.0011, axis=2))
+    assert went.held.tolist() == there.held.tolist()

@@ -7,6 +7,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.virtual import _kernels as kernels
 from rcsa_ident.virtual._kernels import mill
 from rcsa_ident.virtual.milling import Course, mill_cut
 from rcsa_ident.virtual.reduction import Poles, alike
@@ -24,28 +25,90 @@ OUTPUTS = np.tile(WAY.T, (3, 1)).astype(complex)
 NAMES = tuple(Coordinate.parse(f"{point}.{axis}") for point in ("tip", "flange", "fixture") for axis in "xy")
 
 
-def test_march_is_exact_for_a_force_that_is_linear_in_each_step():
+@pytest.mark.parametrize("axial", [False, True])
+def test_march_is_exact_for_a_force_that_is_linear_in_each_step(axial):
+    """Of edges that lean or not, where what pushes along the axis moves the tip, too, or does not."""
     x = POLE * STEP
     first = np.expm1(x) / x
     second = (first - 1.0) / x
-    gain = STEP * np.stack([first - second, second])[:, :, None] * INPUTS
+    way = np.column_stack([WAY, [0.3, -0.7]]) if axial else WAY
+    gain = STEP * np.stack([first - second, second])[:, :, None] * (way / (2j * POLE.imag)[:, None])
     speed, width = 1500.0, 2e-4
     ahead = np.tile(0.5 * np.pi * np.arange(1, 5), (4, 1))
-    # one level of an upright edge: no lag, no offset
-    edge = np.array([0.0, 0.0, 1.0, 0.0, width, DOWN.entry, DOWN.exit, 0.0])
+    # one level of an edge: no lag, no offset
+    edge = np.array([0.0, 0.0, *((0.8, 0.6) if axial else (1.0, 0.0)), width, DOWN.entry, DOWN.exit, 0.0])
     tooth = 0.5 * np.pi * np.arange(4), np.tile(edge, (4, 1, 1))
-    cut = np.array([0.0, speed * STEP, 8e8, 2.4e8, 0.0, 8e3, 6e3, 0.0])
+    cut = np.array([0.0, speed * STEP, 8e8, 2.4e8, 1e8, 8e3, 6e3, 1e3])
     instants = np.arange(1200)
-    course = np.column_stack([1.4 + speed * STEP * instants, 2e-7 * instants, np.ones(1200)])
+    course = np.column_stack([1.4 + speed * STEP * instants, 2e-7 * instants, np.full(1200, 0.9)])
     force = np.zeros((1200, 3))
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
     seen = mill(np.exp(x)[None], gain[None], 2.0 * OUTPUTS[None, :2], np.zeros(2, dtype=complex), tooth, ahead, cut, turn, course, force)
     state = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.diag(OMEGA**2), -np.diag(2.0 * ZETA * OMEGA)]])
-    system = (state, np.vstack([np.zeros((2, 2)), WAY]), np.hstack([WAY.T, np.zeros((2, 2))]), np.zeros((2, 2)))
-    _, expected, _ = scipy.signal.lsim(system, force[:, :2], STEP * np.arange(1200))
+    inputs = way.shape[1]
+    system = (state, np.vstack([np.zeros((2, inputs)), way]), np.hstack([WAY.T, np.zeros((2, 2))]), np.zeros((2, inputs)))
+    _, expected, _ = scipy.signal.lsim(system, force[:, :inputs], STEP * np.arange(1200))
     assert np.abs(force).max() > 5.0
+    assert np.any(force[:, 2] != 0.0)
     # the first instant's force is there before the march begins
     assert np.abs(seen - expected).max() < 1e-9 * np.abs(expected).max()
+    # and it is that of the tool where it was: of old places, of the teeth at the last one
+    local, places, now, path = np.empty(3), -ahead / cut[1], cut.copy(), np.column_stack([seen @ turn, course[:, 1]])
+    path[:, 0] += course[:, 1]
+    for i in range(1, 1200):
+        kernels.passed(i, ahead, course[:, 0].copy(), places)
+        if i % 10 == 0:
+            now[0] = course[i, 0]
+            kernels.cut_force(path[i], *tooth, places, now, 2e-7, path, local)
+            assert force[i] == pytest.approx(0.9 * np.append(turn @ local[:2], local[2]), abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_places_where_other_teeth_stood(seed):
+    """By interpolation, wherever the search begins; before the first step by the speed of that step."""
+    rng = np.random.default_rng(seed)
+    angle = 0.7 + np.cumsum(rng.uniform(0.01, 0.5, 60))
+    for step in (1, 2, 17, 59):
+        ahead = rng.uniform(0.0, 1.2 * (angle[step] - angle[0]), (3, 4))
+        places = rng.uniform(-20.0, 80.0, (3, 4))
+        kernels.passed(step, ahead, angle, places)
+        wanted = angle[step] - ahead
+        early = (wanted - angle[0]) / (angle[1] - angle[0])
+        assert places == pytest.approx(np.where(wanted <= angle[0], early, np.interp(wanted, angle, np.arange(60.0))), abs=1e-9)
+
+
+@pytest.mark.parametrize("unlike", [False, True])
+@pytest.mark.parametrize("seed", range(12))
+def test_a_force_is_that_of_edges_along_their_own_axes(seed, unlike):
+    """Teeth with lags, runout and lean against the past of all teeth: vectors, and the length of an arc inside the immersion."""
+    rng = np.random.default_rng(seed)
+    edges = np.empty((3, 2, 8))
+    lean = rng.uniform(0.0, 1.2, (3, 2))
+    edges[..., 0], edges[..., 1] = rng.uniform(-0.5, 2.0, (3, 2)), rng.uniform(-2e-5, 2e-5, (3, 2))
+    edges[..., 2], edges[..., 3], edges[..., 4] = np.cos(lean), np.sin(lean), rng.uniform(1e-4, 1e-3, (3, 2))
+    edges[..., 5], edges[..., 6] = ((0.0, 2.1), (1.0, np.pi))[seed % 2]
+    edges[..., 7] = rng.uniform(0.0, 0.4, (3, 2))
+    path = np.cumsum(rng.normal(0.0, 1e-5, (50, 3)), axis=0)
+    tooth, position = rng.uniform(0.0, 2.0 * np.pi, 3), path[-1, :2] + [1e-4, 5e-5]
+    places, before = rng.uniform(-20.0, 48.0, (3, 6 if unlike else 3)), 3e-6
+    cut = np.array([rng.uniform(0.0, 7.0), 0.15, *rng.uniform(1e8, 5e8, 3), *rng.uniform(1e3, 5e3, 3)])
+    force, wanted = np.full(3, 9.0), np.zeros(3)
+    kernels.cut_force(position, tooth, edges, places, cut, before, path, force)
+    for j in range(3):
+        for k in range(2):
+            lag, offset, sine, cosine, width, entry, leave, spread = edges[j, k]
+            phi, half = (cut[0] + tooth[j] - lag) % (2.0 * np.pi), 0.5 * max(0.15, spread)
+            inside = sum(max(min(phi + turn + half, leave) - max(phi + turn - half, entry), 0.0) for turn in (0.0, -2.0 * np.pi))
+            outward, ways = np.array([np.sin(phi), np.cos(phi)]), []
+            for m in range(3):
+                back = places[j, 2 * m + k if unlike else m]
+                there = [path[0, 2] + before * back, 0.0] if back < 0.0 else [np.interp(back, np.arange(50), path[:, a]) for a in range(2)]
+                ways.append((position - there) @ outward + offset - edges[(j + 1 + m) % 3, k, 1])
+            if min(ways) > 0.0:
+                along, normal = np.array([-outward[1], outward[0], 0.0]), np.array([*(sine * outward), -cosine])
+                strength = width * inside / (2.0 * half) * (cut[2:5] * min(ways) * sine + cut[5:8])
+                wanted += strength[0] * along - strength[1] * normal + strength[2] * np.cross(along, normal)
+    assert force == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize("growth", [0.0, 0.08])

@@ -340,3 +340,61 @@ def test_a_robots_lines_are_those_of_one_system(outputs):
     expected = posed_dense(arm, spindle, points, outputs)
     for found, other in zip(lines, expected, strict=True):
         np.testing.assert_allclose(found.parts, other, rtol=1e-8, atol=1e-12 * np.abs(other).max())
+
+
+def posed_parts(arm, spindle):
+    """The unknowns of the gradient's columns as one vector, and how large each is."""
+    m = spindle.omega_n.size
+    parts = [arm.stiffness, arm.damping, np.zeros(arm.bodies.shape[1]), np.log(spindle.omega_n), spindle.psi.ravel(), spindle.pull.ravel()]
+    parts += [spindle.factor[np.tril_indices(m)], spindle.residual[np.tril_indices(4)], spindle.joint]
+    size = [*parts[:2], np.ones(parts[2].size), np.ones(m), *(np.full(4 * m, 0.3),) * 2, np.full(parts[6].size, 8.0), np.full(10, 3e-5)]
+    return np.concatenate(parts), np.concatenate([*size, spindle.joint])
+
+
+def posed_of(theta, arm, spindle):
+    """Arm and spindle of such a vector."""
+    n, b, m = arm.stiffness.size, arm.bodies.shape[1], spindle.omega_n.size
+    stiffness, damping, bodies, omega_n, psi, pull, factor, residual, joint = np.split(
+        theta, np.cumsum([n, n, b, m, 4 * m, 4 * m, m * (m + 1) // 2, 10])
+    )
+    mass = arm.mass + np.einsum("b,cbki,cbkj->cij", np.exp(bodies) - 1.0, arm.bodies, arm.bodies)
+    lower = np.zeros((m, m)), np.zeros((4, 4))
+    lower[0][np.tril_indices(m)], lower[1][np.tril_indices(4)] = factor, residual
+    spindle = SpindleArrays(np.exp(omega_n), psi.reshape(m, 4), pull.reshape(m, 4), *lower, joint)
+    return arm._replace(mass=mass, stiffness=stiffness, damping=damping), spindle
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_a_robots_gradient_against_differences_of_one_system(outputs):
+    arm, spindle, points = posed()
+    theta, size = posed_parts(arm, spindle)
+    lines = [room_of(outputs, theta.size) for _ in range(2)]
+    posed_lines(arm, spindle, points, *lines)
+    found = np.stack([each.gradient for each in lines])
+    for k in range(theta.size):
+        step = np.zeros(theta.size)
+        step[k] = 1e-5 * size[k]
+        ahead, behind = (posed_dense(*posed_of(theta + sign * step, arm, spindle), points, outputs).sum(axis=-1) for sign in (1.0, -1.0))
+        slope = (ahead - behind) / 2e-5
+        np.testing.assert_allclose(size[k] * found[..., k], slope, rtol=1e-5, atol=1e-6 * np.abs(slope).max(), err_msg=str(k))
+    # without a gradient all are the same
+    bare = [room_of(outputs, theta.size)._replace(gradient=np.empty((0, outputs, theta.size), dtype=complex)) for _ in range(2)]
+    posed_lines(arm, spindle, points, *bare)
+    for one, two in zip(bare, lines, strict=True):
+        np.testing.assert_array_equal(one.parts, two.parts)
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_a_change_of_a_robots_flange_moves_a_line_by_what_it_feels(outputs):
+    arm, spindle, points = posed()
+    lines = [room_of(outputs, posed_parts(arm, spindle)[0].size) for _ in range(2)]
+    posed_lines(arm, spindle, points, *lines)
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        way = 1e-5 * rng.standard_normal(4)
+        static = spindle.residual @ spindle.residual.T
+        changed = [spindle._replace(residual=np.linalg.cholesky(static + k * 1e-3 * np.outer(way, way))) for k in range(3)]
+        still, ahead, further = (posed_dense(arm, each, points, outputs).sum(axis=-1) for each in changed)
+        slope = (4.0 * ahead - 3.0 * still - further) / 2e-3
+        felt = np.stack([(each.felt @ way) * (each.moved @ way)[:, None] for each in lines])
+        np.testing.assert_allclose(felt, slope, rtol=1e-4, atol=1e-6 * np.abs(slope).max())
