@@ -236,13 +236,15 @@ def _inner(code: CodeType, names: list[str]) -> CodeType:
 def mutants(source: str) -> Iterator[Mutant]:
     """Yield every change of a module's functions and numbers; annotations, defaults, decorators and texts stay as they are."""
     tree = ast.parse(source)
-    for place, function in _places(tree, ""):
-        for change in _changes(place):
-            twin = copy.deepcopy(tree)
-            own = next(node for node in ast.walk(twin) if _same(node, place))
-            before = ast.unparse(own)
-            change(own)
-            yield Mutant(function, place.lineno, before, ast.unparse(own), ast.fix_missing_locations(twin))
+    for n, statement in enumerate(tree.body):
+        for place, function in _places(statement, ""):
+            for change in _changes(place):
+                twin = copy.deepcopy(statement)
+                own = next(node for node in ast.walk(twin) if _same(node, place))
+                before = ast.unparse(own)
+                change(own)
+                body = [*tree.body[:n], ast.fix_missing_locations(twin), *tree.body[n + 1 :]]
+                yield Mutant(function, place.lineno, before, ast.unparse(own), ast.Module(body, []))
 
 
 def _same(node: ast.AST, place: ast.AST) -> bool:

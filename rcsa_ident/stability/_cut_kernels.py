@@ -140,8 +140,8 @@ def _cuts(middle, rows, plan):
 def elements(rows, plan, degree):
     """Return start time, length of a step, steps, first point (-1 where nothing cuts) and start angle of each element."""
     period = plan.period
-    edges = np.empty(4 * rows.shape[0] * (int(period / plan.spacing) + 3) + 2)
-    edges[0], edges[1], count = 0.0, period, 2
+    edges = np.zeros(4 * rows.shape[0] * (int(period / plan.spacing) + 3) + 2)
+    edges[1], count = period, 2
     for row in rows:
         if row[6] == 0.0:
             continue
@@ -156,10 +156,10 @@ def elements(rows, plan, degree):
                     place += plan.spacing
                 if far - near < _NARROW:
                     break
-    for k in range(1, count):
-        # few, and compiled at once; a library's sort is not
+    for k in range(2, count):
+        # few, and compiled at once; a library's sort is not; none is below the first
         value, place = edges[k], k
-        while place > 0 and edges[place - 1] > value:
+        while edges[place - 1] > value:
             edges[place] = edges[place - 1]
             place -= 1
         edges[place] = value
@@ -257,6 +257,8 @@ def lookups(plan, places, points, angle, time, table, stiffness):
     weight = np.zeros((points, count, q + 1))
     starts = np.zeros(points, dtype=np.bool_)
     cutting, inside = np.empty(places.shape[0], dtype=np.int64), 0
+    # of a place that two elements share, shorter than any element
+    touch = 1e-10 / plan.speed
     for e in range(places.shape[0]):
         if places[e, 3] >= 0:
             starts[int(places[e, 3])] = True
@@ -300,7 +302,7 @@ def lookups(plan, places, points, angle, time, table, stiffness):
                 begin, length = places[e, 0], places[e, 1] * places[e, 2]
                 apart = max(begin - then, then - begin - length, 0.0)
                 # of two elements that touch there, a point that starts its own takes the one that starts
-                if apart < distance - 1e-12 * length or (starts[p] and apart <= distance + 1e-12 * length):
+                if apart < distance - touch or (starts[p] and apart <= distance + touch):
                     best, distance = e, min(apart, distance)
             h, steps, first = places[best, 1], int(places[best, 2]), int(places[best, 3])
             x = min(max((then - places[best, 0]) / h, 0.0), float(steps))
@@ -346,12 +348,9 @@ def lay_out(rows, forms, rubbing, plan, table):
     for w in range(rows.shape[0]):
         rows[w, 3] *= plan.share
         rows[w, 4] *= plan.share
-    for pushes in (forms, rubbing):
-        for w in range(pushes.shape[0]):
-            for k in range(5):
-                for a in range(pushes.shape[2]):
-                    for b in range(pushes.shape[2]):
-                        pushes[w, k, a, b] *= plan.share
+    for pushes in (forms.ravel(), rubbing.ravel()):
+        for k in range(pushes.size):
+            pushes[k] *= plan.share
     places, points = elements(rows, plan, table.shape[1] - 1)
     stiffness, damping, angle, time = coefficients(rows, forms, rubbing, plan, places, points, table)
     where, weight = lookups(plan, places, points, angle, time, table, stiffness)

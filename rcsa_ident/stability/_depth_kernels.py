@@ -322,8 +322,6 @@ def first_of_ladder(omega, tips, depths, stiffness, delays, spreads):
         if best >= 1.0:
             share = (1.0 - last) / (best - last)
             start = depths[d - 1] if d > 0 else 0.0
-            return start + share * (depths[d] - start), (
-                place if d == 0 or last_place == 0.0 else last_place + share * (place - last_place)
-            )
+            return start + share * (depths[d] - start), place if last_place == 0.0 else last_place + share * (place - last_place)
         last, last_place = best, place
     return np.inf, np.nan

@@ -316,9 +316,10 @@ def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
             a = omega[0]
             fa = delay_factor(pitch, speeds[i], a) * (0.5 * trace[0] + sign * root[0])
             for k in range(omega.size - 1):
-                parts = 1 + int((omega[k + 1] - omega[k]) * longest / speeds[i] / 0.3)
+                apart = omega[k + 1] - omega[k]
+                parts = 1 + int(apart * longest / speeds[i] / 0.3)
                 for part in range(parts):
-                    b = omega[k] + (omega[k + 1] - omega[k]) * (part + 1) / parts
+                    b = omega[k] + apart * (part + 1) / parts
                     if parts == 1:
                         fb = delay_factor(pitch, speeds[i], b) * (0.5 * trace[k + 1] + sign * root[k + 1])
                     else:

@@ -338,10 +338,8 @@ def largest_of_hessenberg(hessenberg):
             a[k, k] -= shift
         for k in range(start, last):
             x, y = a[k, k], a[k + 1, k]
-            length = math.sqrt(abs(x) ** 2 + abs(y) ** 2)
-            if length == 0.0:
-                cosines[k], sines[k] = 1.0, 0.0j
-                continue
+            # not zero, for y is not, and hypot loses no small numbers
+            length = math.hypot(abs(x), abs(y))
             c = abs(x) / length
             turn = x / abs(x) if x != 0.0 else 1.0 + 0.0j
             s = turn * y.conjugate() / length

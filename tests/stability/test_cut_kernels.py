@@ -102,10 +102,11 @@ def test_elements_cover_the_period_and_end_where_teeth_do(laid_out):
     period = plan.period
     ends = np.append(places[1:, 0], kernels.time_at(period, plan))
     np.testing.assert_allclose(places[:, 0] + places[:, 1] * places[:, 2], ends, rtol=1e-12)
-    assert np.all(places[places[:, 3] >= 0, 1] <= plan.step * (1.0 + 1e-9))
     cutting = places[places[:, 3] >= 0]
+    np.testing.assert_array_equal(cutting[:, 2], np.maximum(np.ceil(cutting[:, 1] * cutting[:, 2] / plan.step - 1e-9), 1.0))
     np.testing.assert_array_equal(cutting[:, 3], np.cumsum(np.concatenate([[0], 4 * cutting[:, 2] + 1]))[:-1])
     assert points == np.sum(4 * cutting[:, 2] + 1)
+    np.testing.assert_array_equal(places[places[:, 3] < 0, 3], -1.0)
     angles = np.append(places[:, 4], period)
     for row in rows:
         for phi in (row[1], row[2]):
@@ -114,10 +115,20 @@ def test_elements_cover_the_period_and_end_where_teeth_do(laid_out):
                 assert apart.min() < 1e-9
 
 
+def test_as_few_steps_as_the_longest_allows(laid_out):
+    plan, rows, *_ = laid_out
+    places, _ = kernels.elements(rows, plan._replace(step=1.0), 4)
+    np.testing.assert_array_equal(places[:, 2], 1.0)
+
+
 def test_coefficients_at_the_points(laid_out):
     plan, rows, forms, rubbing, places, points, table = laid_out
     stiffness, damping, angle, time = kernels.coefficients(rows, forms, rubbing, plan, places, points, table)
     swing = plan.swings * plan.speed
+    # elements begin and end where their neighbours do, to the last bit
+    ends = [(places[e, 4], places[e + 1, 4] if e + 1 < len(places) else plan.period) for e in np.flatnonzero(places[:, 3] >= 0)]
+    outer = [(angle[int(f)], angle[int(f + 4 * n)]) for _, _, n, f, _ in places if f >= 0]
+    np.testing.assert_array_equal(outer, ends)
     # inside elements, not on the jumps at their ends
     inside = np.setdiff1d(np.arange(points), [p for _, _, n, f, _ in places for p in (f, f + 4 * n)])
     for p in inside[:: max(1, inside.size // 9)]:
@@ -154,13 +165,20 @@ def test_means_of_steps():
     rows, forms, rubbing, delays = cut._windows(SPEED, DEPTH)
     plan = cut._plan(SPEED, 1.5e-4, delays)
     places, points = kernels.elements(rows, plan, 3)
-    stiffness, damping, *_ = kernels.coefficients(rows, forms, rubbing, plan, places, points, lobatto(3))
+    table = lobatto(3)
+    stiffness, damping, *_ = kernels.coefficients(rows, forms, rubbing, plan, places, points, table)
     one = next(row for row in places if row[3] >= 0 and row[2] >= 2)
     theta = one[4] + plan.speed * one[1] * (np.arange(200) + 0.5) / 200.0
     mean = np.mean([edge_sum(t, rows[0], plan, forms[0]) for t in theta], axis=0)
-    for j in range(3):
-        np.testing.assert_allclose(stiffness[int(one[3]) + j, 0], mean, rtol=0, atol=2e-3 * np.abs(forms).max())
-        np.testing.assert_array_equal(damping[int(one[3]) + j], damping[int(one[3])])
+    np.testing.assert_allclose(stiffness[int(one[3]), 0], mean, rtol=0, atol=2e-3 * np.abs(forms).max())
+    # of every step, by the nodes' weights
+    within = kernels.coefficients(rows, forms, rubbing, plan._replace(frozen=False), places, points, table)
+    assert places[0, 3] >= 0 > places[1, 3]
+    starts = [int(f) + 3 * n for _, _, steps, f, _ in places if f >= 0 for n in range(int(steps))]
+    for found, each in zip((stiffness, damping), within[:2], strict=True):
+        for start in starts:
+            mean = np.tensordot(table[1], each[start : start + 4], 1)
+            np.testing.assert_allclose(found[start : start + 3], np.stack([mean] * 3), rtol=1e-9, atol=1e-9 * np.abs(each).max())
 
 
 def test_lookups_find_what_was_there_a_delay_ago(laid_out):
@@ -176,9 +194,43 @@ def test_lookups_find_what_was_there_a_delay_ago(laid_out):
     known = path(np.concatenate([time - period, time]))
     pushes = np.abs(stiffness).sum(axis=(2, 3)) > 1e-6 * np.abs(stiffness).max()
     assert pushes.any()
+    stands, begins = np.concatenate([time - period, time]), np.isin(np.arange(points), places[:, 3])
     for p, d in zip(*np.nonzero(pushes), strict=True):
         back = angle[p] - plan.delays[d]
-        wrap = back < (-1e-9 if np.any(places[:, 3] == p) else 1e-9)
+        wrap = back < (-1e-9 if begins[p] else 1e-9)
         then = kernels.time_at(back + plan.period, plan) - period if wrap else kernels.time_at(back, plan)
         found = weight[p, d] @ known[where[p, d] : where[p, d] + 5]
         assert found == pytest.approx(path(then), abs=1e-9)
+        # a point that stands there already is taken alone
+        alone = np.abs(stands - then).min() < 1e-12 * period
+        assert np.array_equal(weight[p, d], [1.0, 0.0, 0.0, 0.0, 0.0]) == alone
+
+
+def test_lookups_keep_to_one_side_of_a_jump(laid_out):
+    """Where a delay leads to two elements that touch, an element's first point sees the one that starts, its last the one that ends."""
+    plan, rows, forms, rubbing, places, points, table = laid_out
+    stiffness, _, angle, time = kernels.coefficients(rows, forms, rubbing, plan, places, points, table)
+    where, weight = kernels.lookups(plan, places, points, angle, time, table, stiffness)
+    cutting = places[places[:, 3] >= 0]
+    first, last = cutting[:, 3].astype(int), (cutting[:, 3] + 4 * cutting[:, 2]).astype(int)
+    owner = np.tile(np.repeat(np.arange(len(cutting)), last - first + 1), 2)
+    for begin, end in zip(first, last, strict=True):
+        for p, edge in ((begin, angle[first]), (end, angle[last])):
+            for d in np.flatnonzero(where[p] >= 0):
+                # the period's end is its start
+                apart = np.abs((edge - angle[p] + plan.delays[d] + 0.5 * plan.period) % plan.period - 0.5 * plan.period)
+                if apart.min() < 1e-10:
+                    assert weight[p, d] @ owner[where[p, d] : where[p, d] + 5] == apart.argmin()
+
+
+def test_nothing_is_looked_up_where_a_step_pushes_nothing_with_that_delay(laid_out):
+    plan, rows, forms, rubbing, places, points, table = laid_out
+    stiffness, _, angle, time = kernels.coefficients(rows, forms, rubbing, plan, places, points, table)
+    pushes, starts = np.zeros_like(stiffness), [int(f) + 4 * n for _, _, steps, f, _ in places if f >= 0 for n in range(int(steps))]
+    looked_up = np.zeros((points, plan.delays.size), dtype=bool)
+    for n, start in enumerate(starts[::3]):
+        # a single entry at a single node, but for the ends that steps share
+        pushes[start + 1 + n % 3, n % plan.delays.size, n % 2, n // 2 % 2] = -1.0
+        looked_up[start : start + 5, n % plan.delays.size] = True
+    where, _ = kernels.lookups(plan, places, points, angle, time, table, pushes)
+    np.testing.assert_array_equal(where >= 0, looked_up)

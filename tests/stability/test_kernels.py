@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+import scipy.optimize
+from numpy.polynomial import Polynomial
 
 from rcsa_ident.stability import _kernels as kernels
 from tests.oracles import naive
@@ -152,13 +156,14 @@ def test_receptance_at_any_frequency():
 
 def test_phases_go_on_within_an_interval(characteristic):
     """psi = pi / 2 + arg mu at nodes of a positive real part, and from there by the turn of mu to the other end of the interval."""
-    trace, determinant = characteristic
+    # there and back, so that real parts become positive and cease to be
+    trace, determinant = (np.append(each, each[-2::-1]) for each in characteristic)
     root = kernels.roots_along(trace, determinant)
     crossings = 0
     for sign in (1.0, -1.0):
         mu, start, end = kernels.phase_steps(trace, root, sign)
         np.testing.assert_allclose(mu, 0.5 * trace + sign * root, rtol=1e-12)
-        for k in range(OMEGA.size - 1):
+        for k in range(trace.size - 1):
             if mu[k].real <= 0.0 and mu[k + 1].real <= 0.0:
                 assert np.isnan(start[k])
                 assert np.isnan(end[k])
@@ -190,3 +195,120 @@ def test_a_limit_in_the_first_interval_of_a_band_is_found(characteristic, before
     again, frequency, _ = kernels.pitch_envelope(*parts, STIFFNESS, uneven, speed)
     assert again[0] == pytest.approx(limit[0], rel=1e-5)
     assert frequency[0] == pytest.approx(chatter[0], rel=1e-6)
+
+
+def drawn_eigenvalues(seed):
+    """Uneven frequencies, and both eigenvalues as polynomials of them, low enough that the kernels' quintics hold trace and determinant."""
+    rng = np.random.default_rng(seed)
+    omega = np.cumsum(rng.uniform(0.15, 0.35, rng.integers(4, 13))) + 1.0
+    from_middle = Polynomial([-omega.mean(), 1.0])
+    drawn = 8.0 * (rng.standard_normal((2, 3)) + 1j * rng.standard_normal((2, 3))) * [1.0, 0.5, 0.1]
+    return omega, (Polynomial(drawn[0, :2])(from_middle), Polynomial(drawn[1])(from_middle))
+
+
+def lowest_limit(omega, eigenvalues, stiffness, pitch, speed):
+    """Limit and chatter frequency by Brent's method around each change of sign of Im(mu W) on a fine scale."""
+
+    def loop(w, mu):
+        return mu(w) * np.mean(1.0 - np.exp(-1j * np.multiply.outer(w, pitch) / speed), axis=-1)
+
+    fine, found = np.linspace(omega[0], omega[-1], 1001), [(np.inf, np.nan)]
+    for mu in eigenvalues:
+        imaginary = loop(fine, mu).imag
+        for k in np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0):
+            w = scipy.optimize.brentq(lambda at, mu=mu: loop(at, mu).imag, fine[k], fine[k + 1], xtol=1e-14, rtol=1e-14)
+            # where W vanishes the depth has no bound
+            if loop(w, mu).real > 1e-9:
+                found.append((1.0 / (stiffness * loop(w, mu).real), w))
+    return min(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("equal", [True, False])
+def test_limits_of_drawn_eigenvalues(equal):
+    """Few and wide intervals: the first and the last count, and either eigenvalue has its turn."""
+    pitch = np.full(3, 2.0 * np.pi / 3.0) if equal else np.array([1.9, 2.2, 2.0 * np.pi - 4.1])
+    speeds, limited = np.linspace(0.25, 2.0, 21 if equal else 8), 0
+    # the walk misses what changes its sign twice in a step; of 15 it does so next to a limit
+    for seed in (*range(15), *range(16, 30)):
+        omega, eigenvalues = drawn_eigenvalues(seed)
+        trace, determinant = (eigenvalues[0] + eigenvalues[1])(omega), (eigenvalues[0] * eigenvalues[1])(omega)
+        if equal:
+            limit, chatter, lobe = kernels.envelope(omega, trace, determinant, 0.5, 3, speeds)
+        else:
+            limit, chatter, lobe = kernels.pitch_envelope(omega, trace, determinant, 0.5, pitch, speeds)
+        expected = np.array([lowest_limit(omega, eigenvalues, 0.5, pitch, speed) for speed in speeds])
+        np.testing.assert_allclose(np.column_stack([limit, chatter]), expected, rtol=1e-11)
+        np.testing.assert_array_equal(lobe, np.where(np.isfinite(limit), np.nan_to_num(expected[:, 1]) // (3.0 * speeds), -1))
+        limited += np.isfinite(limit).sum()
+    assert limited > 80
+
+
+def test_the_largest_real_part_of_drawn_eigenvalues_stands_where_a_fine_scale_finds_it():
+    at_ends = set()
+    for seed in range(8):
+        omega, eigenvalues = drawn_eigenvalues(seed)
+        trace, determinant = (eigenvalues[0] + eigenvalues[1])(omega), (eigenvalues[0] * eigenvalues[1])(omega)
+        fine = np.linspace(omega[0], omega[-1], 3001)
+        real = np.max([mu(fine).real for mu in eigenvalues], axis=0)
+        value, place = kernels.largest_real_part(omega, trace, determinant)
+        assert value == pytest.approx(real.max(), rel=1e-6)
+        assert place == pytest.approx(fine[real.argmax()], abs=2e-3)
+        at_ends.add(np.flatnonzero(omega == place).tobytes())
+    assert len(at_ends) > 1
+
+
+@pytest.mark.parametrize("spacing", [1e-40, 0.3, 1e40])
+def test_weights_of_even_nodes_are_binomials(spacing):
+    weights = kernels.node_weights(spacing * np.arange(3.0, 12.0))
+    assert weights.shape == (8, 6)
+    inside = [(-1.0) ** (5 - i) * math.comb(5, i) / 120.0 for i in range(6)]
+    np.testing.assert_allclose(weights[2:6], np.tile(inside, (4, 1)), rtol=1e-12)
+
+
+def test_the_first_interval_that_ends_above():
+    omega, kept = np.arange(10.0), np.array([0, 1, 4, 5, 7, -1])
+    for value in np.arange(0.0, 9.5, 0.5):
+        assert kernels.first_ending_at(omega, kept, 5, value) == np.searchsorted(omega[kept[:5] + 1], value)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_crossing_that_rounding_moves_past_an_end_lies_there(characteristic, sign):
+    trace, determinant = characteristic
+    weights, root = kernels.node_weights(OMEGA), kernels.roots_along(trace, determinant)
+    for ends, k in (((1e-15, 2.0), 30), ((-2.0, -1e-15), 31), ((1e-15, 1e-15), 31)):
+        found = kernels.crossing(OMEGA, trace, determinant, weights, root, sign, 30, *ends, 1.0)
+        assert found == (OMEGA[k], (0.5 * trace[k] + sign * root[k]).real)
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_limits_where_the_phase_turns_as_fast_as_the_delay(turn):
+    """An eigenvalue that passes zero: from interval to interval the lobe's speeds fall as its phase rises, or rise the faster."""
+    omega, speeds = 12.0 + 0.25 * np.arange(11.0), np.geomspace(1.5, 40.0, 60)
+    eigenvalues = Polynomial([0.5 - 0.65 - 13.3j * turn, 0.05 + 1j * turn]), Polynomial([-50.0])
+    trace, determinant = (eigenvalues[0] + eigenvalues[1])(omega), (eigenvalues[0] * eigenvalues[1])(omega)
+    limit, chatter, _ = kernels.envelope(omega, trace, determinant, 3.0, 3, speeds)
+    alone = [kernels.envelope(omega, trace, determinant, 3.0, 3, speeds[i : i + 1])[0][0] for i in range(speeds.size)]
+    expected = np.array([lowest_limit(omega, eigenvalues, 3.0, np.full(3, 2.0 * np.pi / 3.0), speed) for speed in speeds])
+    assert np.isfinite(expected[:, 0]).sum() > 20
+    np.testing.assert_allclose(np.column_stack([limit, chatter]), expected, rtol=1e-11)
+    np.testing.assert_allclose(alone, limit, rtol=1e-11)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 0.03, 1.0])
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_a_crossing_where_the_phase_turns_sharply(gap, turn):
+    """An eigenvalue that passes zero closely, at a third of the interval, turns by nearly half a circle: Brent's method finds the same."""
+    omega = np.arange(10.0, 18.0)
+    passing = Polynomial([gap - 13.3j * turn, 1j * turn])
+    # the other eigenvalue stands far away
+    trace, determinant = passing(omega) - 50.0, -50.0 * passing(omega)
+    weights, root = kernels.node_weights(omega), kernels.roots_along(trace, determinant)
+    _, start, end = kernels.phase_steps(trace, root, 1.0)
+    for share in np.linspace(0.01, 0.99, 25):
+        half_delay = (start[3] + share * (end[3] - start[3])) / (13.0 + share)
+        ends = start[3] - 13.0 * half_delay, end[3] - 14.0 * half_delay
+        w, real = kernels.crossing(omega, trace, determinant, weights, root, 1.0, 3, *ends, half_delay)
+        exact = scipy.optimize.brentq(lambda at, tau=half_delay: 0.5 * np.pi + np.angle(passing(at)) - at * tau, 13.0, 14.0, xtol=1e-15)
+        assert w == pytest.approx(exact, abs=1e-9)
+        assert real == pytest.approx(gap)

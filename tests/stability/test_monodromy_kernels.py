@@ -96,10 +96,11 @@ def test_elements_of_nearly_equal_steps_share_what_was_computed():
     """Also where the first and the last of them differ by more than neighbours do."""
     cut = MonodromyOperator(tip(ONE), mill(2, 0.5), 2, False)
     m, r, h = cut.arrays.pole.size, cut.arrays.outputs.shape[0], 3e-4
-    places = np.array([[0.0, h * (1.0 + 0.7e-12 * k), 1.0, 3.0 * k, 0.0] for k in range(3)])
-    nothing = np.zeros((9, 1), dtype=int), np.zeros((9, 1, 3)), np.zeros(9)
-    layout = CutLayout(places, np.zeros((9, 1, r, r)), np.zeros((9, r, r)), *nothing)
+    places = np.array([[0.0, h * (1.0 + change), 1.0, 3.0 * k, 0.0] for k, change in enumerate((0.0, 0.7e-12, 1.4e-12, 1e-10))])
+    nothing = np.zeros((12, 1), dtype=int), np.zeros((12, 1, 3)), np.zeros(12)
+    layout = CutLayout(places, np.zeros((12, 1, r, r)), np.zeros((12, r, r)), *nothing)
     decay, drive, seen, echo, same, *_ = kernels.prepare(cut.arrays, layout, cut.table, False)
+    np.testing.assert_array_equal(same, [0, 0, 0, 3])
     wanted = np.empty((3, m), dtype=complex), np.empty((3, m, r), dtype=complex), np.empty((2, 2, r, m), dtype=complex)
     kernels.responses(h, cut.arrays, cut.table, *wanted, np.zeros((2, 2, 3, r, r)))
     for e in same:
@@ -139,6 +140,75 @@ def test_arnoldi_against_all_eigenvalues(name):
     found = cut.multiplier(speed, depth, step, residual=1e-9)
     assert abs(found.value - complex(largest.real, abs(largest.imag))) < 1e-8
     assert found.residual < 1e-9
+
+
+@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("tolerance", [1.0, 1e-4, 1e-13])
+def test_what_arnoldi_tells_of_its_vector_is_true(name, tolerance):
+    """The residual is that of the vector under the whole map; the forces are those that march with it."""
+    modes, process, frozen = SMALL[name]
+    cut = MonodromyOperator(tip(modes), process, 3, frozen)
+    given = 15000.0 * RPM, 1e-3, 2e-4
+    layout, whole = cut._lay_out(*given), dense(cut, *given)
+    value, residual, used, vector, force = kernels.multiplier(cut.arrays, layout, cut.table, frozen, tolerance, True, np.zeros(0))
+    assert residual < tolerance
+    m, (points, r, _) = cut.arrays.pole.size, layout.damping.shape
+    # nobody asks for the motion of the period's first points
+    seen = np.concatenate([np.arange(2 * m), 2 * m + np.arange(min(layout.where[layout.where >= 0]) * r, points * r)])
+    assert np.all(np.delete(whole, seen, axis=1) == 0.0)
+    assert np.linalg.norm(vector) == pytest.approx(1.0)
+    left = np.linalg.norm(whole[np.ix_(seen, seen)] @ vector - value * vector) / abs(value)
+    assert left == pytest.approx(residual, rel=1e-6, abs=1e-12)
+    marched = np.zeros((points, r), dtype=complex)
+    prepared = kernels.prepare(cut.arrays, layout, cut.table, frozen)
+    for factor, part in ((1.0, vector.real), (1j, vector.imag)):
+        every, forces = np.zeros(2 * m + points * r), np.zeros((points, r))
+        every[seen] = part
+        motion = np.concatenate([every[2 * m :].reshape(points, r), np.zeros((points, r))])
+        kernels.march(every[:m] + 1j * every[m : 2 * m], motion, forces, cut.arrays, layout, cut.table, frozen, prepared)
+        marched += factor * forces
+    np.testing.assert_allclose(force, marched, rtol=1e-9, atol=1e-9 * np.abs(force).max())
+    assert used < len(seen)
+    if tolerance == 1.0:
+        assert used <= 8 + 2 * m
+
+
+@pytest.mark.parametrize("rpm", [4500.0, 6000.0, 8000.0, 10500.0, 15000.0])
+def test_as_many_vectors_as_the_structure_has_modes_that_last(rpm):
+    """Two more for each that decays by less than 1.5 nepers in a period, and by no more than half of that faster than the slowest."""
+    cut = MonodromyOperator(tip(SKEWED), SMALL["unequal pitch"][1], 3, False)
+    layout = cut._lay_out(rpm * RPM, 1e-3, 1e-4)
+    decays = -cut.arrays.pole.real * 60.0 / rpm
+    first = 8 + 2 * np.sum((decays < 1.5) & (decays - decays.min() < 0.75))
+    used = [kernels.multiplier(cut.arrays, layout, cut.table, False, tolerance, False, np.zeros(0))[2] for tolerance in (np.inf, 1e-12)]
+    assert used[0] == first
+    # and then every third
+    assert (used[1] - first) % 3 == 0
+
+
+def test_length_and_a_start_that_is_known():
+    assert kernels._length(np.array([3.0, -4.0, 12.0])) == pytest.approx(13.0)
+    cut = MonodromyOperator(tip(SKEWED), SMALL["unequal pitch"][1], 3, False)
+    layout = cut._lay_out(15000.0 * RPM, 1e-3, 2e-4)
+    value, _, used, vector, _ = kernels.multiplier(cut.arrays, layout, cut.table, False, 1e-12, False, np.zeros(0))
+    again, _, fewer, _, _ = kernels.multiplier(cut.arrays, layout, cut.table, False, 1e-12, False, 1e3 * vector.real)
+    assert again == pytest.approx(value, rel=1e-10)
+    assert fewer <= used
+
+
+@pytest.mark.parametrize("name", ["half", "rubbing, a tool that gives way at once"])
+def test_constant_steps_converge_to_polynomials(name):
+    """Quadratically: the limit of halved steps that are constant is what polynomials find with long ones, however these are cut."""
+    modes, process = tip(ONE), mill(2, 0.5)
+    if name != "half":
+        modes, process = tip(SKEWED, (3e-9, 2e-9)), mill(2, 0.3, damping=ProcessDamping(2e13, 5e-5))
+    speed, depth = 15000.0 * RPM, 1e-3
+    exact, again = (MonodromyOperator(modes, process, 5).multiplier(speed, depth, step, residual=1e-10).value for step in (1e-4, 1.7e-4))
+    assert abs(exact - again) < 2e-7
+    constant = MonodromyOperator(modes, process, 2, frozen=True)
+    one, two = (constant.multiplier(speed, depth, step, residual=1e-10).value for step in (5e-5, 2.5e-5))
+    assert 3.0 < abs(one - exact) / abs(two - exact) < 5.0
+    assert abs(two + (two - one) / 3.0 - exact) < 0.05 * abs(two - exact)
 
 
 def windows(process):

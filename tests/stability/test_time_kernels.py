@@ -12,6 +12,7 @@ from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.cutting.rows import places_of
 from rcsa_ident.stability import _time_kernels as kernels
 from rcsa_ident.stability.time_domain import _Cut
+from rcsa_ident.stability.tip_modes import ModeArrays
 from tests.stability import shaped_mills as mills
 from tests.stability.mills import RPM, SKEWED, mill, tip
 
@@ -24,7 +25,10 @@ CASES = {
     ),
     "run-out": (tip(SKEWED), mill(2, 0.5, runout=[0.0, 60e-6], feed_per_tooth=5e-5)),
     "pitch": (tip(SKEWED), mill(3, 0.5, pitch=np.radians([100.4, 120.9, 138.7]), feed_per_tooth=5e-5)),
-    "a varying speed": (tip(SKEWED), mill(2, 0.5, feed_per_tooth=5e-5, speed_variation=SpeedVariation(0.3, 0.5))),
+    "a varying speed": (
+        tip(SKEWED),
+        mill(2, 0.5, feed_per_tooth=5e-5, speed_variation=SpeedVariation(0.3, 0.3), damping=ProcessDamping(1e14, 6e-5)),
+    ),
     "a ball": (mills.tip(mills.M1), replace(mills.BALL, feed_per_tooth=1e-4, damping=ProcessDamping(3e13, 6e-5))),
     "a face mill, slopes": (mills.tip(mills.M2, -7.0), replace(mills.FACE, feed_per_tooth=1e-4)),
     "a helix of each tooth": (mills.tip(mills.M1[:2]), replace(mills.HELIX, feed_per_tooth=1e-4)),
@@ -158,3 +162,46 @@ def test_clock():
         swing = 0.3 * 900.0
         angle = 900.0 * (t + 0.7 / swing * (1.0 - np.cos(swing * t)))
         assert kernels._time(angle, 0.9 * t, plan) == pytest.approx(t, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_pieces_of_an_edge_push_on_their_own(name):
+    """The force of all is the sum of what each pushes with, also where some are in the air and others are not."""
+    cut = _Cut(*CASES[name], SPEED, True)
+    run, rng = cut.begin(DEPTH), np.random.default_rng(4)
+    alone, whole = np.empty((len(run.pieces), cut.directions)), np.empty(cut.directions)
+    mixed = 0
+    for number in rng.integers(0, 4000, 12):
+        here, velocity, past = (scale * rng.standard_normal(shape) for scale, shape in (
+            (4e-5, cut.directions), (0.05, cut.directions), (4e-5, run.memory.past.shape)
+        ))  # fmt: skip
+        for i in range(len(run.pieces)):
+            kernels.force_at(number, here, velocity, past, run.pieces[i : i + 1], run.plan, SPEED, np.empty(cut.directions), alone[i])
+        kernels.force_at(number, here, velocity, past, run.pieces, run.plan, SPEED, np.empty(cut.directions), whole)
+        np.testing.assert_allclose(whole, alone.sum(axis=0), rtol=1e-9, atol=1e-9 * np.abs(alone).max())
+        pushes = np.any(alone != 0.0, axis=1)
+        mixed += np.any(np.diff(pushes.astype(int)) == 1)
+    assert mixed > 0
+
+
+def test_a_step_of_any_pole():
+    """A force that falls to zero over the step, by Gauss's quadrature, also of poles that hardly move in a step."""
+    h, rng = 1e-4, np.random.default_rng(5)
+    x = np.array([0.0, 1e-6j, 9.9e-4, -7e-4 + 7e-4j, -1.01e-3, -0.3 + 2.0j, -5.0])
+    node, weight = np.polynomial.legendre.leggauss(30)
+    falls = 0.5 * weight @ (np.exp(0.5 * (node[:, None] + 1.0) * x) * 0.5 * (node[:, None] + 1.0))
+    outputs, inputs = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape) for shape in ((2, 7), (7, 2)))
+    force = rng.standard_normal(2)
+    # of the force's size, so that neither drowns
+    state = h * (rng.standard_normal(7) + 1j * rng.standard_normal(7))
+    expected = np.exp(x) * state + h * falls * (inputs @ force)
+    cut = _Cut(*CASES["half"], SPEED, True)
+    run = cut.begin(DEPTH)
+    plan, memory = run.plan._replace(step=h * SPEED), kernels.Memory(state, force.copy(), np.zeros((10, 2)))
+    samples = np.empty((1, 6))
+    modes = ModeArrays(x / h, outputs, inputs, np.zeros((2, 2)))
+    kernels.simulate(modes, run.pieces[:0], plan, memory, 5, samples)
+    np.testing.assert_allclose(memory.state, expected, rtol=2e-10)
+    np.testing.assert_allclose(samples[0, :2], 2.0 * np.real(outputs @ expected), rtol=1e-9)
+    np.testing.assert_allclose(samples[0, 2:4], 2.0 * np.real(outputs @ (x / h * expected)), rtol=1e-9)
+    np.testing.assert_array_equal(memory.past[5], samples[0, :2])
