@@ -151,7 +151,7 @@ def test_a_holder_of_the_catalogue_makes_a_tooling(shop):
     assert {"ER32", "shrink", "power"} <= {each.name for each in listed.chucks}
     found = client.holder("HSK-A63", "ER32", 12.0)
     assert found.holder.insertion_mm == 40.0
-    assert sum(s.length_mm for s in found.holder.segments) == 100.0
+    assert sum(s.length_mm for s in found.holder.segments) == pytest.approx(100.0, rel=1e-12)
     assert "ISO 12164-1" in found.sources[0]
     assert client.holder("BT40", "ER32", 12.0, 70.0).mass_kg < found.mass_kg
     contact = found.contact.keys
