@@ -136,6 +136,28 @@ def test_march(name, leaves):
     )
 
 
+def test_flanks_rub_at_the_speed_of_the_moment():
+    """A quarter of a wave of the speed after the start it is 30 % off, and so is what rubs."""
+    modes, process = CASES["a varying speed"]
+    # both ways, as in the linear equations
+    cut = _Cut(modes, process, SPEED, False)
+    run = cut.begin(DEPTH).pushed(2e-5)
+    first, r = run.number, cut.directions
+    order = np.arange(first - run.memory.past.shape[0], first)
+    tips = run.memory.past[order % run.memory.past.shape[0]]
+    # a wave takes 1 / 0.3 turns
+    samples = run.march(int(0.5 * np.pi / 0.3 / cut.step))
+    largest = np.abs(samples[:, 2 * r :]).max()
+    i = int(np.flatnonzero(np.abs(samples[:, 2 * r :]).max(axis=1) > 0.3 * largest)[-1])
+    number, v = first + i, process.speed_variation
+    speed = SPEED * (1.0 + v.amplitude * np.sin(v.ratio * SPEED * cut.time(cut.step * np.array([number]))[0]))
+    assert abs(speed / SPEED - 1.0) > 0.25
+    path = [(np.append(order, np.arange(first, number)), np.append(tips[:, a], samples[:i, a])) for a in range(r)]
+    moved = process, cut.step, samples[i, :r], samples[i, r : 2 * r], path, number, DEPTH, run.plan
+    np.testing.assert_allclose(samples[i, 2 * r :], force_of(*moved, speed), rtol=0.0, atol=4e-4 * largest)
+    assert np.abs(samples[i, 2 * r :] - force_of(*moved, SPEED)).max() > 4e-3 * largest
+
+
 def test_a_tooth_in_the_air_pushes_nothing():
     cut = _Cut(*CASES["half"], SPEED, True)
     run = cut.begin(DEPTH)
