@@ -311,10 +311,13 @@ def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
     lobes = np.full(m, -1, dtype=np.int64)
     root, weights = roots_along(trace, determinant), node_weights(omega)
     longest = pitch.max()
+    # places around which a sign changes: interval, its two ends, Im at the first
+    found = np.empty((2, 4))
     for i in range(m):
         for sign in (1.0, -1.0):
-            a = omega[0]
+            a, z, interval = omega[0], omega[0], 0
             fa = delay_factor(pitch, speeds[i], a) * (0.5 * trace[0] + sign * root[0])
+            fz = fa
             for k in range(omega.size - 1):
                 apart = omega[k + 1] - omega[k]
                 parts = 1 + int(apart * longest / speeds[i] / 0.3)
@@ -324,13 +327,30 @@ def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
                         fb = delay_factor(pitch, speeds[i], b) * (0.5 * trace[k + 1] + sign * root[k + 1])
                     else:
                         fb = delay_factor(pitch, speeds[i], b) * eigenvalue_at(omega, trace, determinant, weights, root, sign, k, b)
-                    highest = max(fa.real, fb.real)
-                    if fa.imag * fb.imag <= 0.0 and highest > 0.0 and 0.9 / (stiffness * highest) < limit[i]:
-                        low, high, from_low = a, b, fa.imag
-                        w, f = b, fb
+                    highest, changes = max(fa.real, fb.real, fz.real), 0
+                    if highest > 0.0 and 0.9 / (stiffness * highest) < limit[i]:
+                        if fa.imag * fb.imag <= 0.0:
+                            found[0, 0], found[0, 1], found[0, 2], found[0, 3] = k, a, b, fa.imag
+                            changes = 1
+                        elif fz.imag * fa.imag > 0.0 and abs(fa.imag) < abs(fz.imag) and abs(fa.imag) <= abs(fb.imag):
+                            # next to zero there, and perhaps beyond it: at the vertex of the parabola through all three
+                            to_z, to_b = (a - z) * (fa.imag - fb.imag), (a - b) * (fa.imag - fz.imag)
+                            v = a - 0.5 * ((a - z) * to_z - (a - b) * to_b) / (to_z - to_b)
+                            within = k if v > a else interval
+                            fv = delay_factor(pitch, speeds[i], v) * eigenvalue_at(
+                                omega, trace, determinant, weights, root, sign, within, v
+                            )
+                            if fv.imag * fa.imag < 0.0:
+                                found[:, 0] = within
+                                found[0, 1], found[0, 2], found[0, 3] = z if v < a else a, v, fa.imag
+                                found[1, 1], found[1, 2], found[1, 3] = v, a if v < a else b, fv.imag
+                                changes = 2
+                    for each in range(changes):
+                        within, low, high, from_low = int(found[each, 0]), found[each, 1], found[each, 2], found[each, 3]
+                        w, f = low, fa
                         for _ in range(50):
                             w = 0.5 * (low + high)
-                            f = delay_factor(pitch, speeds[i], w) * eigenvalue_at(omega, trace, determinant, weights, root, sign, k, w)
+                            f = delay_factor(pitch, speeds[i], w) * eigenvalue_at(omega, trace, determinant, weights, root, sign, within, w)
                             if f.imag * from_low > 0.0:
                                 low = w
                             else:
@@ -339,7 +359,7 @@ def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
                             limit[i] = 1.0 / (stiffness * f.real)
                             chatter[i] = w
                             lobes[i] = int(w / speeds[i] / pitch.size)
-                    a, fa = b, fb
+                    z, fz, interval, a, fa = a, fa, k, b, fb
     return limit, chatter, lobes
 
 
