@@ -20,6 +20,8 @@ _HIT, _PULSE = 0.2, 0.02
 _BOUNCE, _BOUNCE_SHARE = 0.1, 0.05
 #: Time before a hit that belongs to it [s], and the shortest record of one.
 _BEFORE, _SHORTEST = 1e-3, 0.02
+#: Sampling rate below which no hit has a shape [Hz].
+_LEAST_RATE = 200.0
 #: Equal samples in a row at an extreme that an overloaded input gives.
 _FLAT = 4
 #: Share of the response's largest value that may be left at its end; what is more is windowed away.
@@ -152,6 +154,8 @@ def tap(
     2000.0
     """
     positive("sampling_rate_hz", rate, "Hz")
+    if rate < _LEAST_RATE:
+        raise InputError("sampling_rate_hz", f"{rate:g} Hz", f"at least {_LEAST_RATE:g} Hz: a hit takes milliseconds")
     if derivative not in (0, 1, 2):
         raise InputError("quantity", derivative, "displacement (0), velocity (1) or acceleration (2)")
     hits: list[Hit] = []

@@ -123,3 +123,8 @@ def test_convolution_is_what_the_response_is():
     time = np.arange(force.size) / RATE
     impulse = sum(np.exp(-z * w * time) * np.sin(w * np.sqrt(1 - z**2) * time) / (m * w * np.sqrt(1 - z**2)) for w, z, m in MODES)
     np.testing.assert_allclose(fftconvolve(force, impulse)[: force.size] / RATE, response, atol=2e-3 * np.abs(response).max())
+
+
+def test_a_rate_at_which_no_hit_has_a_shape_is_refused():
+    with pytest.raises(InputError, match="sampling_rate_hz: found 1 Hz, allowed is at least 200 Hz"):
+        tap(1.0, [(np.array([0.02, -1e300]), np.array([0.0, -2.0]))])
