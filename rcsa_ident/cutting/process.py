@@ -34,18 +34,18 @@ class ProcessDamping(Shown):
 
     Examples
     --------
-    A slow cut with a sharp edge, and with one that is worn by 0.1 mm:
+    A slow cut with a sharp edge, and with one that is worn by 0.02 mm:
 
     >>> import rcsa_ident as ri
     >>> mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
     >>> cutter, slot = ri.Cutter(2, 0.012), ri.Engagement.from_immersion(1.0, "up")
     >>> tip = ri.TipModes.of({ri.Dof.Y: mode})
-    >>> for damping in (None, ri.ProcessDamping(indentation=1e14, wear_land=0.1e-3)):
+    >>> for damping in (None, ri.ProcessDamping(indentation=1e14, wear_land=0.02e-3)):
     ...     cut = ri.MillingProcess(cutter, ri.CuttingCoefficients(7e8, 0.3), slot, damping=damping)
     ...     lobes = ri.stability_lobes(tip, cut, ri.rpm(1500, 1600, 100), 10e-3, ri.FullDiscretisation())
     ...     print((1e3 * lobes.limit_depth).round(2))
     [0.72 0.85]
-    [6.33 6.15]
+    [1.1  1.22]
     """
 
     indentation: float
