@@ -181,7 +181,7 @@ def test_a_data_folder_is_its_owners_alone(tmp_path):
     there = tmp_path / "there"
     there.mkdir(mode=0o755)
     for folder in (there, tmp_path / "new"):
-        create_app(Settings(data=folder), None, Here(), Here(), Near())
+        create_app(Settings(data=folder), None, Here(), Here(), Near()).state.components.store.close()
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
