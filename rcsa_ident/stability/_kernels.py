@@ -302,7 +302,8 @@ def delay_factor(pitch, speed, w):
 def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
     """Return what `envelope` does for any pitch, by a walk along the frequencies at each speed.
 
-    Both factors of a K mu W = 1, W the mean of 1 - e^{-i w tau_j}, are followed; Im(mu W) changes sign on the boundary.
+    Both factors of a K mu W = 1, W the mean of 1 - e^{-i w tau_j}, are followed; Im(mu W) changes sign on the boundary. Where it comes
+    nearest to zero it may do so twice within one step.
     The lobe number is the whole waves in the mean delay.
     """
     m = speeds.size

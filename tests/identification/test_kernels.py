@@ -98,31 +98,22 @@ def test_fit_cuts_leaves_alone_what_nothing_tells():
     np.testing.assert_allclose(nuisance[:, 1], 0.0, atol=1e-12)  # angles without an air cut
 
 
-def test_fit_cuts_never_makes_it_worse():
-    rng = np.random.default_rng(10)
-    for _ in range(20):
-        lines, weights, model, start, prior, _ = cuts(rng, [6, 2], scatter=1.0)
-        before = np.stack([rng.uniform(0.0, prior[:, 3]), rng.uniform(-0.3, 0.3, 2)], axis=1)
-        after = before.copy()
-        kernels.fit_cuts(lines, weights, model, start, prior, after, 0)
-        for k in range(2):
-            part = slice(start[k], start[k + 1])
-            here = [naive_misfit(lines[part], weights[part], model[part], prior[k], n[k]) for n in (before, after)]
-            assert here[1] <= here[0] * (1.0 + 1e-12)
-
-
-def test_fit_cuts_from_anywhere_comes_down():
-    """From the tops as from the slopes: what is not a minimum yet gets less, over steps that are too long at first."""
-    rng = np.random.default_rng(16)
+@pytest.mark.parametrize(
+    ("seed", "lines_of_cuts", "scatter", "times"),
+    # lines without any order; and from the tops as from the slopes, over steps that are too long at first
+    [(10, [6, 2], 1.0, 1.0 + 1e-12), (16, [6, 5], 0.1, 0.98)],
+)
+def test_fit_cuts_from_anywhere_comes_down(seed, lines_of_cuts, scatter, times):
+    rng = np.random.default_rng(seed)
     for _ in range(12):
-        lines, weights, model, start, prior, _ = cuts(rng, [6, 5], scatter=0.1)
+        lines, weights, model, start, prior, _ = cuts(rng, lines_of_cuts, scatter=scatter)
         before = np.stack([rng.uniform(0.0, prior[:, 3]), rng.uniform(-0.3, 0.3, 2)], axis=1)
         after = before.copy()
         kernels.fit_cuts(lines, weights, model, start, prior, after, 0)
         for k in range(2):
             part = slice(start[k], start[k + 1])
             here = [naive_misfit(lines[part], weights[part], model[part], prior[k], n[k]) for n in (before, after)]
-            assert here[1] < 0.98 * here[0]
+            assert here[1] <= times * here[0]
 
 
 @pytest.mark.parametrize("orders", [[1.0, 2.0, 3.0, 4.0], [1.0, 1.0, 2.0, 5.0], [3.0, 4.0, 5.0, 7.0]])

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import rcsa_ident as ri
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.stability import _monodromy_kernels as kernels
 from rcsa_ident.stability._cut_kernels import CutLayout
 from rcsa_ident.stability.monodromy import MonodromyOperator, lobatto
+from rcsa_ident.stability.multiplier_limits import longest_step
 from rcsa_ident.stability.tip_modes import ModeArrays
 from tests.oracles import naive
 from tests.stability.mills import ONE, RPM, SKEWED, Table, mill, tip
@@ -140,6 +142,20 @@ def test_arnoldi_against_all_eigenvalues(name):
     found = cut.multiplier(speed, depth, step, residual=1e-9)
     assert abs(found.value - complex(largest.real, abs(largest.imag))) < 1e-8
     assert found.residual < 1e-9
+
+
+def test_a_vibration_grows_for_a_dozen_passes_and_dies_away():
+    """Worn teeth in a slow slot: all eigenvalues are small, and the largest motion of a pass is a million times that of a dozen before."""
+    mode = ri.normal_modes([ri.hz(900.0)], [0.02], [[5.0]], (ri.Coordinate("tip", ri.Dof.Y),))
+    slot, damping = ri.Engagement.from_immersion(1.0, "up"), ProcessDamping(1e14, 1e-4)
+    process = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(7e8, 0.3), slot, damping=damping)
+    cut = MonodromyOperator(ri.TipModes.of({ri.Dof.Y: mode}), process, 6)
+    found = dense(cut, 1600.0 * RPM, 6.15e-3, longest_step(cut))
+    assert np.abs(np.linalg.eigvals(found)).max() < 0.5
+    motion = slice(2 * cut.arrays.pole.size, None)
+    growth = [np.abs(np.linalg.matrix_power(found, n)[motion, motion]).sum(axis=1).max() for n in (1, 12, 100)]
+    assert growth[1] > 1e6
+    assert growth[2] < 1.0
 
 
 @pytest.mark.parametrize("name", SMALL)
