@@ -112,7 +112,7 @@ class _Turn:
         self.scratch = Path("/dev/shm" if os.path.isdir("/dev/shm") else folder) / f"fuzz-{os.getpid()}"
         self.scratch.mkdir(parents=True, exist_ok=True)
         self.calls = self.finds = 0
-        self.begun = self.resting = 0.0
+        self.begun = 0.0
         self.seeds = [path.read_bytes() for path in sorted((folder / "seeds" / name).iterdir())]
         self.last = (folder / f"{name}.last").open("wb")
 
@@ -157,7 +157,7 @@ class _Turn:
                 self.target.read(seed, self.scratch)
             except refusals():
                 continue
-        self.begun, self.resting = _processor(), _resident()
+        self.begun = _processor()
 
     def _blind(self) -> NoReturn:
         rng = random.Random(self.seed)
@@ -173,7 +173,7 @@ class _Turn:
         self.last.write(raw)
         self.last.truncate()
         self.last.flush()
-        before = _processor()
+        before, peak, resting = _processor(), _peak(), _resident()
         told = where = ""
         try:
             self.target.read(raw, self.scratch)
@@ -181,12 +181,12 @@ class _Turn:
             pass
         except Exception as error:
             told, where = traceback.format_exc(), place(error)
-        spent, more = _processor() - before, _peak() - self.resting
+        # what earlier calls left behind is not this one's
+        spent, more = _processor() - before, _peak() - resting if _peak() > peak else 0.0
         if spent > MOST_SECONDS:
             told, where = told + f"{spent:.1f} s of a core for {len(raw)} bytes\n", where or "too long"
         if more > MOST_MEGABYTES:
             told, where = told + f"{more:.0f} MB for {len(raw)} bytes\n", where or "too much memory"
-            self.resting = _peak()
         self.calls += 1
         if where:
             self.finds += _keep(self.folder, self.name, raw, where, told)

@@ -139,7 +139,8 @@ def _walk(whole: bytes, order: str, outer: Variable, found: list[Variable], dept
         if width < 1 or at + size > len(whole):
             raise InputError(f"variable {outer.name}", f"names of fields of {width} bytes", COMPLETE, where)
         fields = [whole[i : i + width].split(b"\0")[0].decode("utf-8", "replace") for i in range(at, at + size, width)]
-    for i in range(count):
+    # without fields a struct holds nothing, however large it says to be
+    for i in range(count if fields else 0):
         for field in fields:
             if place + 8 > len(whole):
                 raise InputError(f"variable {outer.name}", "a struct or cell that is cut off", COMPLETE, where)

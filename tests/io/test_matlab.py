@@ -195,6 +195,17 @@ def test_structs_in_structs_end(tmp_path):
         signals(tmp_path / "cut.mat", "x.a", rate=1.0)
 
 
+def test_a_struct_without_fields_has_an_end(tmp_path):
+    """It may say to be an array of billions of them (found by the fuzzer: 39 s for 3.3 kB)."""
+    path = tmp_path / "cut.mat"
+    scipy.io.savemat(path, {"x": {}, "Fs": 1.0})
+    raw = path.read_bytes()
+    shape, many = struct.pack("<ii", 1, 1), struct.pack("<ii", 2**31 - 1, 2**31 - 1)
+    path.write_bytes(raw.replace(shape, many, 1))
+    with pytest.raises(InputError, match=r"channel x\.a: found no such channel"):
+        signals(path, "x.a", rate=1.0)
+
+
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 
