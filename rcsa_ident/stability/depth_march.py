@@ -17,6 +17,8 @@ from rcsa_ident.stability.regeneration import directions_of, regeneration
 
 #: Ratio of the depths at which the mean stiffness is asked, and how far below the largest they begin.
 _RATIO, _LEAST = 1.08, 1e-3
+#: Strengths of a material: the stiffness is proportional to them, so that few will do.
+_STRENGTHS = 16
 #: Change of a direct receptance, as a share, from one frequency to the next; and into how many at most those of the receptance are cut.
 _CHANGE, _MOST = 0.05, 4
 
@@ -67,6 +69,16 @@ def ladder(process: MillingProcess, directions: int, max_depth: float) -> DepthL
     pitch = edges_at(process.cutter, depth, np.full(depth.size, 0.5 * np.pi)).pitch.T
     at_tip = process.cutter.pitch
     return DepthLadder(depth, stiffness, 0.5 * (pitch + at_tip), np.abs(pitch - at_tip))
+
+
+def strengths(process: MillingProcess, directions: int, depth: float, most: float) -> DepthLadder:
+    """Return a cut at one depth [m] as a ladder of strengths, up to so many times what it is; they stand in the place of the depths."""
+    times = most * np.geomspace(_LEAST, 1.0, _STRENGTHS)
+    mean = regeneration(process, depth, directions_of(directions)).mean
+    pitch = edges_at(process.cutter, np.array([depth]), np.array([0.5 * np.pi])).pitch.T
+    both = np.stack([0.5 * (pitch + process.cutter.pitch), np.abs(pitch - process.cutter.pitch)])
+    distance, spread = np.repeat(both, times.size, axis=1)
+    return DepthLadder(times, times[:, None, None] * mean, distance, spread)
 
 
 def finer(tip: Receptance) -> tuple[FloatArray, ComplexArray]:

@@ -25,6 +25,8 @@ _SWINGS = 60
 _KEPT = 512
 #: How often a depth that is surely stable is halved at most.
 _SMALLER = 60
+#: Samples of the noise that a vibration may grow from in a wave of the highest mode.
+_PER_WAVE = 8.0
 #: Slices of the edge per metre where modes have a shape along it.
 SLICES = 6000.0
 
@@ -161,6 +163,45 @@ class MonodromyOperator:
             value, vector, force = value.conjugate(), vector.conj(), force.conj()
         omega, motion = self._waves(value, speed, force, layout) if waves else (np.zeros(0), np.zeros(0))
         return Multiplier(value, self.duration(speed), vector, omega, motion, float(left))
+
+    def growth(self, speed: float, depth: float, step: float, periods: int, most: float, seed: int = 0) -> float:
+        """Return by what a vibration grows at most within some periods, whatever becomes of it after them.
+
+        It begins as noise on the surface. With small multipliers it dies away in the end, and may have grown a million times by then
+        [trefethen2005].
+
+        Parameters
+        ----------
+        speed : float [rad/s]
+        depth : float [m]
+        step : float [s]
+            Longest step.
+        periods : int
+        most : float
+            Growth beyond which nobody asks how much it is.
+        seed : int
+            Of the noise.
+        """
+        layout = self._laid_out(speed, depth, step)
+        if layout.time.size == 0:
+            return 1.0
+        points, duration, r = layout.time.size, self.duration(speed), self.arrays.outputs.shape[0]
+        samples = int(_PER_WAVE * duration * float(np.max(np.abs(self.arrays.pole))) / (2.0 * np.pi)) + 2
+        noise, at = np.random.default_rng(seed).standard_normal((r, samples)), np.linspace(0.0, duration, samples)
+        state, force = np.zeros(self.arrays.pole.size, dtype=complex), np.zeros((points, r))
+        # the period before, and the one that follows it
+        motion = np.concatenate([np.stack([np.interp(layout.time, at, each) for each in noise], axis=1), np.zeros((points, r))])
+        prepared = _monodromy_kernels.prepare(self.arrays, layout, self.table, self.frozen)
+        first = largest = 0.0
+        for _ in range(periods + 1):
+            _monodromy_kernels.march(state, motion, force, self.arrays, layout, self.table, self.frozen, prepared)
+            motion[:points] = motion[points:]
+            peak = float(np.max(np.abs(motion[points:])))
+            first = first or max(peak, 1e-300)
+            largest = max(largest, peak / first)
+            if largest > most:
+                break
+        return largest
 
     def _free(self, speed: float) -> Multiplier:
         """The multiplier of a tool that cuts nothing: its slowest mode dies away."""

@@ -20,8 +20,14 @@ _NODES, _LOW_DEGREE, _STEPS = 9.0, 4.0, 24.0
 #: Depth over axial pitch beyond which islands may stand under a limit: at 5 % immersion and 30 degrees one stands at 0.2, at 20 % and
 #: 17 degrees at 0.03.
 ISLANDS = 0.03
-#: Residual of the multiplier for a first look.
-ROUGH = 1e-4
+#: Residual of the multiplier for a first look, and of the one that has to be one in size at the limit, to which share.
+ROUGH, _SETTLED, _ONE = 1e-4, 1e-9, 0.02
+#: A cut is lost, too, where a vibration grows by this factor within so many passes of the teeth, even if it dies away after them.
+GROWS, PASSES = 1000.0, 40
+#: From so many noises, of which one is enough where a vibration grows by less than this share of it.
+_NOISES, _DOUBTFUL = 4, 30.0
+#: Share of a limit by multipliers at which that is looked at: at the limit itself nothing dies away.
+BEFORE = 0.99
 #: Krylov vectors of a look at a depth, as counted on identified machines; share of the period that helix and entry add to the cut.
 _VECTORS, _ENTRY = 30.0, 0.2
 #: How much finer the step is by which the error is told, and how often the search is repeated with it.
@@ -50,6 +56,23 @@ class Growth:
         found = self.cut.multiplier(self.speed, depth, self.step, self.start, residual=self.residual)
         self.start = found.vector
         return float(np.log(max(abs(found.value), 1e-300))) / self.teeth
+
+
+class Passage:
+    """Logarithm of the growth of a vibration within `PASSES` over `GROWS`, over the depth, at one speed and step."""
+
+    def __init__(self, cut: MonodromyOperator, speed: float, step: float) -> None:
+        self.cut, self.speed, self.step = cut, speed, step
+        self.periods = int(np.ceil(PASSES * 2.0 * np.pi / (cut.period * cut.process.cutter.teeth)))
+
+    def __call__(self, depth: float) -> float:
+        grown = self._from_noise(depth, 0)
+        if grown > GROWS / _DOUBTFUL:
+            grown = max(grown, *(self._from_noise(depth, seed) for seed in range(1, _NOISES)))
+        return float(np.log(grown / GROWS))
+
+    def _from_noise(self, depth: float, seed: int) -> float:
+        return self.cut.growth(self.speed, depth, self.step, self.periods, GROWS**2, seed)
 
 
 def longest_step(cut: MonodromyOperator) -> float:
@@ -84,7 +107,8 @@ def visits(process: MillingProcess, speeds: FloatArray, top: float, max_depth: f
     points = np.maximum(cutting * waves * each, 2.0 * degree * windows)
     islands = islands_from(process)
     looks = LOOKS + (np.log(max_depth / islands) / np.log(CAREFUL) if islands < max_depth else 0.0)
-    return looks * _VECTORS * points * (FITTED_MODES + windows - 1)
+    passing = PASSES * 2.0 * np.pi / (cutter.teeth * period)
+    return (looks * _VECTORS + passing) * points * (FITTED_MODES + windows - 1)
 
 
 def islands_from(process: MillingProcess) -> float:
@@ -112,21 +136,38 @@ def marched_lobes(
     limit = np.full(speeds.size, np.inf)
     chatter = np.full(speeds.size, np.nan)
     lobe, flip = np.full(speeds.size, -1, dtype=np.intp), np.zeros(speeds.size, dtype=bool)
-    low, lost = stable_depth_bound(cut.modes, cut.process), 0
+    low, lost, passing = stable_depth_bound(cut.modes, cut.process), 0, 0
     for i in coarse_to_fine(speeds.size):
         speed = float(speeds[i])
         depth, step, good = _limit(cut, speed, low, max_depth, intervals, tolerance)
-        lost += not good
+        sooner = _passing_limit(cut, speed, step, low, cut.process.within_reach(max_depth) if depth is None else depth, tolerance)
+        passing += sooner is not None
+        depth = depth if sooner is None else sooner
         if depth is not None:
-            found = cut.multiplier(speed, depth, step, waves=True)
+            found = cut.multiplier(speed, depth, step, waves=True, residual=_SETTLED)
             limit[i], chatter[i] = depth, dominant(found)
             lobe[i] = int(chatter[i] / (speed * cut.process.cutter.teeth))
             # a quasi-periodic vibration may pass -1, too, but as one of a pair
             flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
+            good = sooner is not None or (good and abs(abs(found.value) - 1.0) < _ONE)
+        lost += not good
         if watch is not None:
             watch(speed, float(limit[i]), float(chatter[i]))
     doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
+    if passing:
+        doubts.append(
+            f"at {passing} of {speeds.size} speeds the limit is the depth at which a vibration grows a thousandfold within {PASSES} teeth, "
+            "although it would die away after them: somewhat deeper cuts are stable in theory only"
+        )
     return StabilityLobes(speeds, limit, chatter, lobe, max_depth, method, warnings=tuple(doubts), flip=flip)
+
+
+def _passing_limit(cut: MonodromyOperator, speed: float, step: float, low: float, deepest: float, tolerance: float) -> float | None:
+    """The depth at which a vibration grows too much before it dies away; None if there is none up to a limit by multipliers."""
+    passage = Passage(cut, speed, step)
+    if passage(BEFORE * deepest) < 0.0:
+        return None
+    return first_loss(passage, low, deepest, tolerance)
 
 
 def dominant(found: Multiplier) -> float:

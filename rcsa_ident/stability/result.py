@@ -63,6 +63,8 @@ class Pocket(Shown):
 class StabilityLobes(Drawn):
     """The smallest depth at which a cut loses stability, over spindle speed.
 
+    Methods that march also end where a vibration grows a thousandfold before it dies away, and say so.
+
     Parameters
     ----------
     spindle_speed : array, shape (n,) [rad/s]

@@ -15,7 +15,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part, pitch_envelope
-from rcsa_ident.stability.depth_march import Marched, finer, ladder, march
+from rcsa_ident.stability.depth_march import Marched, finer, ladder, march, strengths
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.regeneration import check_constant
 from rcsa_ident.stability.result import StabilityLobes
@@ -28,6 +28,9 @@ FEWEST_TEETH_IN_CUT = 1.0
 _PITCH_FACTOR = 30.0
 #: Operations of a march through depths.
 _MARCH = 2500.0
+#: How many times as long as the tip remembers a vibration the next tooth may take until nobody but the surface tells it of that one: with
+#: 8 a vibration grows by less than a thousand before it dies away. Where the tip is asked, as shares of the critical frequency.
+_FORGOTTEN, _BELOW, _ABOVE = 8.0, 0.8, 1.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +94,16 @@ class ZeroOrder:
         found = Marched(limit, chatter, lobe, absolute, place if exists else np.nan)
         return self._answer(found, receptance, process, speeds, max_depth)
 
+    def strength(self, tip: Receptance | TipModes, process: MillingProcess, speed: float, depth: float, most: float) -> tuple[float, float]:
+        """Return how many times stronger the material may be in a cut of one depth [m], and how it vibrates then [rad/s].
+
+        The mean stiffness is proportional to the strength, which is marched through as depths are.
+        """
+        check_constant(process)
+        receptance = receptance_of(tip)
+        found = march(*finer(receptance), process, strengths(process, receptance.values.shape[1], depth, most), np.array([speed]))
+        return float(found.limit[0]), float(found.chatter[0])
+
     def _marched(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limits of a cut whose mean stiffness is not proportional to the depth."""
         check_constant(process)
@@ -112,7 +125,7 @@ class ZeroOrder:
             self.name,
             absolute_limit=None if unlike else float(found.absolute),
             absolute_frequency=None if unlike else critical,
-            warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, critical)),
+            warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, critical, speeds)),
             withheld=unlike,
         )
 
@@ -261,7 +274,7 @@ def _unlike_teeth(process: MillingProcess) -> str:
     return f"{'; '.join(told)}; no depth is recommended from zero-order limits: full-discretisation takes unlike teeth" if told else ""
 
 
-def _doubts(process: MillingProcess, receptance: Receptance, critical: float | None) -> list[str]:
+def _doubts(process: MillingProcess, receptance: Receptance, critical: float | None, speeds: FloatArray) -> list[str]:
     cutter, engagement = process.cutter, process.widest
     doubts = []
     in_cut = cutter.teeth * (engagement.exit - engagement.entry) / (2.0 * np.pi)
@@ -276,7 +289,25 @@ def _doubts(process: MillingProcess, receptance: Receptance, critical: float | N
         doubts.append("process damping is left out: the limit is too low at low speeds")
     if critical is not None:
         doubts += _band_doubts(receptance, critical)
+        passing = 2.0 * np.pi / (cutter.teeth * speeds)
+        slow = int(np.sum(passing > _FORGOTTEN * _memory(receptance, critical)))
+        if slow:
+            doubts.append(
+                f"at {slow} of {speeds.size} speeds a vibration is forgotten long before the next tooth: what grows within a turn before "
+                "it dies away is left out, and the limit may be far too high; full-discretisation tells it"
+            )
     return doubts
+
+
+def _memory(receptance: Receptance, critical: float) -> float:
+    """For how long the tip remembers a vibration about a critical frequency: the longest delay of a group of waves there [s]."""
+    own = np.abs(np.einsum("kii->ki", receptance.values))
+    near = (receptance.omega > _BELOW * critical) & (receptance.omega < _ABOVE * critical)
+    if near.sum() < 3:
+        return np.inf
+    strongest = int(np.argmax(own[near].max(axis=0)))
+    phase = np.unwrap(np.angle(receptance.values[near, strongest, strongest]))
+    return float(np.max(-np.gradient(phase, receptance.omega[near])))
 
 
 def _band_doubts(receptance: Receptance, critical: float) -> list[str]:

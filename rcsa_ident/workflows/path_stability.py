@@ -21,8 +21,7 @@ from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.lobes import both_directions, stability_lobes
-from rcsa_ident.stability.multiplier_limits import longest_step
-from rcsa_ident.stability.stability_map import MonodromyMethod
+from rcsa_ident.stability.strength import Search, strength
 from rcsa_ident.stability.surface_error import forced_vibration, surface_location_error
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.engagement import PathEngagement
@@ -206,6 +205,7 @@ def cuts_along(
         groups.setdefault(key, []).append(move)
         cuts.setdefault(key, (station, engagement, depth))
     warnings: list[str] = []
+    near = np.nan
     tips: dict[tuple[int, float], tuple[Receptance | TipModes, Receptance | TipModes]] = {}
     for done, (key, which) in enumerate(groups.items()):
         station, engagement, depth = cuts[key]
@@ -222,7 +222,7 @@ def cuts_along(
         if place not in tips:
             ((_, tip),) = one.tips(one.speeds, one.omega, spread=change.draws > 0)
             tips[place] = tip, modes_of(tip, one.process) if change.method.needs == "modes" else tip
-        answer = _Answer.of(one, *tips[place], depth)
+        answer = _Answer.of(one, *tips[place], depth, near)
         for name, value in (
             ("margin", answer.margin),
             ("low", answer.low),
@@ -234,6 +234,7 @@ def cuts_along(
             rows[name][which] = value
         mean[which] = answer.mean
         of_strength[which] = not isinstance(engagement, Engagement)
+        near = near if isinstance(engagement, Engagement) else answer.margin
         # how thin a chip is the path says, and not whoever gave it
         warnings += [each for each in answer.warnings if not each.startswith("radial immersion")]
         if progress is not None:
@@ -313,13 +314,14 @@ class _Answer:
     warnings: Sequence[str]
 
     @classmethod
-    def of(cls, change: ToolChange, tip: Receptance | TipModes, modes: Receptance | TipModes, depth: float) -> _Answer:
-        """Of a tip, and of what stands for it where a method wants modes."""
+    def of(cls, change: ToolChange, tip: Receptance | TipModes, modes: Receptance | TipModes, depth: float, near: float) -> _Answer:
+        """Of a tip, of what stands for it where a method wants modes, and the margin of the cut before, which is similar."""
         process = change.process
         if isinstance(process.engagement, Engagement):
             margin, low, chatter, warnings = _margin(change, tip, process, depth)
         else:
-            margin, chatter, warnings = _strength(change, modes, process, depth)
+            search = Search(FARTHEST, _MARGIN, near)
+            margin, chatter, warnings = strength(change.method, modes, process, float(change.speeds[0]), depth, search)
             low = margin
         speed = float(change.speeds[0])
         angle = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
@@ -345,36 +347,6 @@ def _margin(
     margin = min(float(found.limit_depth[0]) / depth, FARTHEST)
     low = margin if found.drawn is None else min(float(found.limit_quantile(0.95)[0]) / depth, margin)
     return margin, low, float(found.chatter_frequency[0]), found.warnings
-
-
-def _strength(change: ToolChange, tip: Receptance | TipModes, process: MillingProcess, depth: float) -> tuple[float, float, Sequence[str]]:
-    """How many times stronger the material may be until a cut of this very depth chatters, its frequency then, and what is said."""
-    speed, said, at = float(change.speeds[0]), list[str](), np.nan
-
-    def unstable(times: float) -> bool:
-        nonlocal at
-        c = process.coefficients
-        harder = replace(process, coefficients=replace(c, tangential=times * c.tangential))
-        if isinstance(change.method, MonodromyMethod):
-            assert isinstance(tip, TipModes)
-            cut = change.method.monodromy(tip, harder)
-            found = cut.multiplier(speed, depth, longest_step(cut), waves=True)
-            if abs(found.value) >= 1.0:
-                at = float(found.omega[np.argmax(found.motion)]) if found.omega.size else np.nan
-            return abs(found.value) >= 1.0
-        lobes = stability_lobes(tip, harder, change.speeds, depth, change.method, 0)
-        if np.isfinite(lobes.limit_depth[0]):
-            at = float(lobes.chatter_frequency[0])
-            said.extend(lobes.warnings)
-        return bool(np.isfinite(lobes.limit_depth[0]))
-
-    if not unstable(FARTHEST):
-        return FARTHEST, np.nan, said
-    low, high = 1.0 / FARTHEST, FARTHEST
-    while high > (1.0 + _MARGIN) * low:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if unstable(middle) else (middle, high)
-    return low, at, said
 
 
 def described(found: CutsAlong, path: ToolPath) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.cutting.process import MillingProcess, ProcessDamping
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
 from rcsa_ident.stability.tip_modes import TipModes
@@ -23,6 +23,10 @@ SKEWED: Table = ((0, 780.0, 0.03, 0.05), (1, 930.0, 0.02, 0.04), (1, 1350.0, 0.0
 FOUR: Table = tuple((axis, *row) for axis, name in ((0, "x"), (1, "y")) for row in FOUR_MODES[name].tolist())
 COEFFICIENTS = CuttingCoefficients(_I["tangential"], _I["normal"] / _I["tangential"])
 FOUR_COEFFICIENTS = CuttingCoefficients(FOUR_MODES["tangential"], FOUR_MODES["normal"] / FOUR_MODES["tangential"])
+#: A mode in a slow slot, whose vibrations grow for many passes before they die away.
+PASSING: Table = ((1, 900.0, 0.02, 0.04),)
+#: Slow slots of such: wear land [m], damping ratio, immersion and speed [rev/min].
+SLOW = [(1e-4, 0.02, 1.0, 1600.0), (2e-5, 0.02, 1.0, 800.0), (None, 0.1, 1.0, 400.0), (None, 0.1, 0.05, 800.0), (5e-5, 0.02, 0.3, 800.0)]
 SLOT = Engagement(0.0, np.pi)
 HALF = Engagement.from_immersion(0.5, "down")
 
@@ -48,3 +52,9 @@ def mill(teeth: int = 2, immersion: float = 0.5, strategy: str = "down", helix: 
     own = {name: np.asarray(more.pop(name)) for name in ("pitch", "runout") if name in more}
     coefficients = more.pop("coefficients", COEFFICIENTS)
     return MillingProcess(Cutter(teeth, 0.012, helix, **own), coefficients, Engagement.from_immersion(immersion, strategy), **more)
+
+
+def slow_slot(wear_land: float | None, immersion: float = 1.0) -> MillingProcess:
+    """Two teeth, as `PASSING` wants them."""
+    damping = None if wear_land is None else ProcessDamping(1e14, wear_land)
+    return mill(2, immersion, "up", coefficients=CuttingCoefficients(7e8, 0.3), damping=damping, feed_per_tooth=1e-4)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.conditions import Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.errors import InputError
@@ -20,7 +20,7 @@ from rcsa_ident.stability.tip_modes import TipModes
 from tests.oracles import naive
 from tests.oracles.literature import MULTIPLIER_DEPTH_MM, MULTIPLIER_RPM, MULTIPLIERS
 from tests.stability.mills import COEFFICIENTS, HALF, ONE, RPM, SKEWED, TWO, Table, mill, tip
-from tests.stability.test_monodromy_kernels import dense
+from tests.stability.test_monodromy_kernels import SMALL, dense
 
 #: The mill of the published multipliers: polynomials' degree, constant coefficients, steps per tooth period. What is good to 1e-5 takes
 #: very many steps of a low order.
@@ -246,6 +246,34 @@ def test_modes_that_move_the_edge_less_away_from_the_tip():
         radius(MonodromyOperator(half, mill(), 6), 9000.0, 1.2e-3, 14),
     )
     assert two == pytest.approx(one, rel=1e-7)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_growth_is_that_of_the_map_written_down(name):
+    """Noise along the period before; the largest peak of a period over that of the first, and no more periods than it takes."""
+    modes, process, frozen = SMALL[name]
+    cut, speed, depth, step = MonodromyOperator(tip(modes), process, 3, frozen), 9000.0 * RPM, 4e-3, 2e-4
+    layout, duration, m = cut._lay_out(speed, depth, step), cut.duration(speed), cut.arrays.pole.size
+    # eight samples of each direction in a wave of the highest mode
+    samples = int(8.0 * duration * np.abs(cut.arrays.pole).max() / (2.0 * np.pi)) + 2
+    noise = np.random.default_rng(5).standard_normal((cut.arrays.outputs.shape[0], samples))
+    motion = np.stack([np.interp(layout.time, np.linspace(0.0, duration, samples), each) for each in noise], axis=1)
+    vector, peaks = np.concatenate([np.zeros(2 * m), motion.ravel()]), []
+    for _ in range(6):
+        vector = dense(cut, speed, depth, step) @ vector
+        peaks.append(np.abs(vector[2 * m :]).max())
+    assert cut.growth(speed, depth, step, 5, 1e300, 5) == pytest.approx(max(peaks) / peaks[0], rel=1e-9)
+    assert cut.growth(speed, depth, step, 0, 1e300, 5) == 1.0
+    assert cut.growth(speed, depth, step, 5, 0.5, 5) == 1.0
+    assert cut.growth(speed, depth, step, 5, 1e300, 6) != pytest.approx(max(peaks) / peaks[0], rel=1e-6)
+
+
+def test_without_a_cut_nothing_grows():
+    """Material that begins above the edges that are asked for."""
+    above = EngagementMap(np.array([2e-3, 3e-3]), np.ones(2), np.full(2, 2.0))
+    cut = MonodromyOperator(tip(ONE), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, above), 3)
+    assert cut.growth(9000.0 * RPM, 1e-3, 1e-4, 5, 1e300) == 1.0
+    assert cut.multiplier(9000.0 * RPM, 1e-3, 1e-4).value == pytest.approx(np.exp(cut.arrays.pole[0] * cut.duration(9000.0 * RPM)))
 
 
 def test_waves():

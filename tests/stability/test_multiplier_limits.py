@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
+from rcsa_ident.stability import multiplier_limits
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.monodromy import stable_depth_bound
-from rcsa_ident.stability.multiplier_limits import Growth, longest_step
+from rcsa_ident.stability.multiplier_limits import GROWS, PASSES, Growth, longest_step
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
-from tests.stability.mills import ONE, RPM, SKEWED, TWO, mill, tip
+from tests.stability.mills import ONE, PASSING, RPM, SKEWED, SLOW, TWO, mill, slow_slot, tip
 
 SPEEDS = np.array([5000.0, 8200.0, 11700.0, 18000.0, 26000.0]) * RPM
 FULL = FullDiscretisation()
@@ -137,3 +138,43 @@ def test_more_wear_is_more_damping():
     none = stability_lobes(tip(SKEWED), mill(2, 0.5), np.array([2000.0]) * RPM, 50e-3, FULL).limit_depth[0]
     assert limits[0] == pytest.approx(none, rel=3e-3)
     assert np.all(np.diff(limits) > 0.0)
+
+
+@pytest.mark.parametrize(("wear", "zeta", "immersion", "rpm"), SLOW)
+def test_a_vibration_that_grows_a_thousandfold_is_a_limit(wear, zeta, immersion, rpm):
+    """Multipliers alone have no sharp limit there; this one has, whatever the step, and noises that it has not seen tell the same."""
+    modes, process, speeds = tip(((1, 900.0, zeta, 0.04),)), slow_slot(wear, immersion), np.array([rpm]) * RPM
+    found, finer = (stability_lobes(modes, process, speeds, 40e-3, m) for m in (FULL, FullDiscretisation(intervals=200)))
+    limit = float(found.limit_depth[0])
+    assert found.warnings == finer.warnings != ()
+    assert "grows a thousandfold" in found.warnings[0]
+    assert finer.limit_depth[0] == pytest.approx(limit, rel=0.01)
+    cut = FULL.monodromy(modes, process)
+
+    def grown(depth: float) -> float:
+        return float(np.median([cut.growth(speeds[0], depth, longest_step(cut), PASSES, 1e12, seed) for seed in range(100, 120)]))
+
+    assert grown(0.75 * limit) < GROWS < grown(1.25 * limit)
+    # far from a rounding of the largest multiplier
+    assert abs(cut.multiplier(speeds[0], limit, longest_step(cut), residual=1e-12).value) < 0.95
+
+
+def test_a_vibration_grows_below_the_largest_depth_and_no_multiplier_tells():
+    """All multipliers are small up to 5 mm; the largest motion grows a thousandfold from 4 mm on."""
+    speeds = np.array([1600.0]) * RPM
+    modes, process = tip(PASSING), slow_slot(1e-4)
+    cut = FULL.monodromy(modes, process)
+    assert max(abs(cut.multiplier(speeds[0], depth, longest_step(cut)).value) for depth in (1e-3, 3e-3, 5e-3)) < 1.0
+    found = stability_lobes(modes, process, speeds, 5e-3, FULL)
+    assert 3.5e-3 < found.limit_depth[0] < 4.5e-3
+    assert np.isfinite(found.chatter_frequency[0])
+    assert stability_lobes(modes, process, speeds, 3e-3, FULL).stable[0]
+
+
+def test_fast_cuts_are_decided_by_multipliers(monkeypatch):
+    """What passes does not move a limit at which nothing passes, by a digit."""
+    found = stability_lobes(tip(SKEWED), PROCESSES["helix"], SPEEDS, 20e-3, FULL)
+    monkeypatch.setattr(multiplier_limits, "GROWS", 1e12)
+    same = stability_lobes(tip(SKEWED), PROCESSES["helix"], SPEEDS, 20e-3, FULL)
+    np.testing.assert_array_equal(found.limit_depth, same.limit_depth)
+    assert found.warnings == same.warnings == ()

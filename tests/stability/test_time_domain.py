@@ -12,13 +12,15 @@ from rcsa_ident.cutting.force import force_history, force_lines, runout_force_li
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
+from rcsa_ident.stability.first_instability import first_loss
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.multiplier_limits import Growth, longest_step
 from rcsa_ident.stability.time_domain import TimeDomain, _Cut, milling_history
 from rcsa_ident.virtual.limit import true_limit
 from rcsa_ident.virtual.reduction import Poles
 from tests.oracles.literature import LIMIT_RPM, SLOT_LIMIT_MM
-from tests.stability.mills import ONE, RPM, SKEWED, mill, tip
+from tests.stability.mills import ONE, RPM, SKEWED, SLOW, mill, slow_slot, tip
 
 LINEAR, CONTACT, FULL = TimeDomain(contact_loss=False), TimeDomain(), FullDiscretisation()
 EDGED = CuttingCoefficients(6e8, 0.3, tangential_edge=2e4, radial_edge=1.5e4)
@@ -72,11 +74,19 @@ def test_modes_that_die_before_the_next_tooth_cuts():
     """Heavily damped modes forget a push in the air: what carries a disturbance on is the surface."""
     heavy = ((0, 700.0, 0.9, 0.01), (0, 1500.0, 0.7, 0.02), (1, 800.0, 0.99, 0.01))
     speeds = np.array([4300.0, 8000.0]) * RPM
-    exact, found = (
-        stability_lobes(tip(heavy), mill(2, 0.5), speeds, 60e-3, m).limit_depth for m in (FullDiscretisation(tolerance=1e-3), LINEAR)
-    )
-    assert np.all(np.isfinite(exact))
+    found = stability_lobes(tip(heavy), mill(2, 0.5), speeds, 60e-3, LINEAR).limit_depth
+    cut = FULL.monodromy(tip(heavy), mill(2, 0.5))
+    exact = [first_loss(Growth(cut, float(speed), longest_step(cut)), 1e-4, 60e-3, 1e-3) for speed in speeds]
     np.testing.assert_allclose(found, exact, rtol=1.2e-2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("wear", "zeta", "immersion", "rpm"), [*SLOW, (None, 0.1, 0.3, 800.0), (5e-5, 0.02, 1.0, 1600.0)])
+def test_vibrations_that_grow_before_they_die_away(wear, zeta, immersion, rpm):
+    """Chatter in time is a push that grows 20 000 times: somewhat deeper than where noise grows a thousandfold, far below multipliers."""
+    modes, process, speeds = tip(((1, 900.0, zeta, 0.04),)), slow_slot(wear, immersion), np.array([rpm]) * RPM
+    found, exact = (float(stability_lobes(modes, process, speeds, 40e-3, m).limit_depth[0]) for m in (LINEAR, FULL))
+    assert 1.05 < found / exact < 1.4
 
 
 @pytest.mark.slow

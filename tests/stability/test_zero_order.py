@@ -208,6 +208,19 @@ def test_one_flexible_direction():
     ).stable[0]
 
 
+@pytest.mark.parametrize(("zeta", "below"), [(0.005, 120.0), (0.02, 500.0), (0.1, 2400.0)])
+def test_what_passes_within_a_turn_is_left_out_and_told(zeta, below):
+    """Where the structure has forgotten a vibration before the next tooth: 8 over damping and natural frequency, near the critical one."""
+    lines = 2.0 * np.pi * np.arange(300.0, 2001.0, 1.0)
+    values = np.zeros((lines.size, 2, 2), dtype=complex)
+    values[:, 1, 1] = resonance(lines, 900.0, zeta, 0.04)
+    process, speeds = MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), below * np.array([0.5, 0.8, 1.3, 3.0]) * RPM
+    told = [w for w in stability_lobes(Receptance(lines, values, TIP, TIP), process, speeds, 1.0).warnings if "forgotten" in w]
+    assert told
+    assert told[0].startswith("at 2 of 4 speeds")
+    assert not [w for w in stability_lobes(Receptance(lines, values, TIP, TIP), process, speeds[2:], 1.0).warnings if "forgotten" in w]
+
+
 def test_doubts_are_told():
     thin = Engagement.from_immersion(0.1, "down")
     lobes = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, thin), [900.0], 1.0)
