@@ -40,6 +40,7 @@ STUDIES = (
     "identification",
     "search_trace",
     "lobes_truth",
+    "slow_spindle",
     "tested_cuts",
     "first_page",
     "streaming",

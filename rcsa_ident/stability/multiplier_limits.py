@@ -165,9 +165,7 @@ def marched_lobes(
 def _passing_limit(cut: MonodromyOperator, speed: float, step: float, low: float, deepest: float, tolerance: float) -> float | None:
     """The depth at which a vibration grows too much before it dies away; None if there is none up to a limit by multipliers."""
     passage = Passage(cut, speed, step)
-    if passage(BEFORE * deepest) < 0.0:
-        return None
-    return first_loss(passage, low, deepest, tolerance)
+    return None if passage(BEFORE * deepest) < 0.0 else first_loss(passage, low, deepest, tolerance)
 
 
 def dominant(found: Multiplier) -> float:

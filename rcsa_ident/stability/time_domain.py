@@ -41,6 +41,8 @@ _MEMORY, _MOST = 25, 120
 _SETTLING = 22.0
 #: A disturbance that has fallen to this share of the push is gone.
 _GONE = 1e-5
+#: In the place of what is larger, or too large to be a number.
+_BEYOND = 1e100
 #: Steps of the ladder of depths.
 _RATIO = 1.2
 
@@ -193,15 +195,18 @@ class _Run:
     def settle(self, tolerance: float) -> bool:
         """Go to the state that a period repeats, stable or not: Anderson's acceleration of one period after the other.
 
-        Returns whether a period changes it by less than `tolerance` [m].
+        Returns whether a period changes it by less than `tolerance` [m]; where it grows beyond all numbers it stays as it was.
         """
         states: list[FloatArray] = []
         changes: list[FloatArray] = []
-        x = self.vector
+        begun = x = self.vector
         for _ in range(_MOST):
             self.march(self.cut.per_period)
             after = self.vector
             change = after - x
+            if not np.all(np.isfinite(change)):
+                self.vector = begun
+                return False
             if np.max(np.abs(change[-self.memory.past.size :])) < tolerance:
                 return True
             states.append(after)
@@ -406,7 +411,9 @@ class _Cut:
         scale[r + 3 :] *= self.radius
         sizes, paths = [], []
         for _ in range(max(8, int(np.ceil(periods / self.tooth_periods)))):
-            change = pushed.march(self.per_period) - still.march(self.per_period)
+            with np.errstate(over="ignore", invalid="ignore"):
+                apart = pushed.march(self.per_period) - still.march(self.per_period)
+            change = np.clip(np.nan_to_num(apart, nan=_BEYOND), -_BEYOND, _BEYOND)
             paths.append(change[:, :2])
             sizes.append(float(np.linalg.norm(change[:, : 2 * r] * scale)) / np.sqrt(change.shape[0]))
             if not _GONE * push < sizes[-1] < _CHATTER * self.feed:

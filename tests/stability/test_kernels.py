@@ -144,6 +144,9 @@ def test_receptance_at_any_frequency():
     # a real signal's response
     np.testing.assert_array_equal(kernels.receptance_at(OMEGA, values, -inside), found.conj())
     assert np.all(kernels.receptance_at(OMEGA, values, np.array([OMEGA[-1] + 1.0, -1e9])) == 0.0)
+    # in any order, those beyond the end before the others
+    mixed = kernels.receptance_at(OMEGA, values, np.append(OMEGA[-1] + 1.0, inside))
+    np.testing.assert_array_equal(mixed, np.concatenate([np.zeros_like(found[:1]), found]))
     low = kernels.receptance_at(OMEGA, values, np.array([0.0, 0.5 * OMEGA[0]]))
     np.testing.assert_array_equal(low[0], values[0].real)
     np.testing.assert_allclose(low[1], values[0].real + 0.5j * values[0].imag, rtol=1e-12)

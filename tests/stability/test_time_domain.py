@@ -20,7 +20,7 @@ from rcsa_ident.stability.time_domain import TimeDomain, _Cut, milling_history
 from rcsa_ident.virtual.limit import true_limit
 from rcsa_ident.virtual.reduction import Poles
 from tests.oracles.literature import LIMIT_RPM, SLOT_LIMIT_MM
-from tests.stability.mills import ONE, RPM, SKEWED, SLOW, mill, slow_slot, tip
+from tests.stability.mills import ONE, PASSING, RPM, SKEWED, SLOW, mill, slow_slot, tip
 
 LINEAR, CONTACT, FULL = TimeDomain(contact_loss=False), TimeDomain(), FullDiscretisation()
 EDGED = CuttingCoefficients(6e8, 0.3, tangential_edge=2e4, radial_edge=1.5e4)
@@ -87,6 +87,16 @@ def test_vibrations_that_grow_before_they_die_away(wear, zeta, immersion, rpm):
     modes, process, speeds = tip(((1, 900.0, zeta, 0.04),)), slow_slot(wear, immersion), np.array([rpm]) * RPM
     found, exact = (float(stability_lobes(modes, process, speeds, 40e-3, m).limit_depth[0]) for m in (LINEAR, FULL))
     assert 1.05 < found / exact < 1.4
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+@pytest.mark.parametrize("rpm", [30.0, 100.0, 200.0])
+def test_what_grows_beyond_all_numbers_is_chatter(rpm, leaves):
+    """Within one tooth of a slow spindle a deep cut grows by more than a number holds."""
+    cut = _Cut(tip(PASSING), slow_slot(None), rpm * RPM, leaves)
+    for depth in (10e-3, 60e-3):
+        assert 5.0 < cut.growth(depth, 150) < 1000.0
+    assert cut.growth(0.1e-3, 150) < 0.0
 
 
 @pytest.mark.slow
