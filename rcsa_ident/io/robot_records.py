@@ -44,6 +44,10 @@ def _from_matlab(path: Path) -> JointRecord:
         motor, joint, torque = motor.T, joint.T, torque.T
     if not len(motor) == ratio.size == inertia.size:
         raise InputError(_RATIO, f"{ratio.size} gear ratios", f"one a joint, of which there are {len(motor)}", str(path))
+    shapes = {name: values.shape for name, values in ((_MOTOR, motor), (_JOINT, joint), (_TORQUE, torque))}
+    if set(shapes.values()) != {(len(motor), time.size)}:
+        found = ", ".join(f"{name} {rows} x {columns}" for name, (rows, columns) in shapes.items())
+        raise InputError("record", found, f"one row a joint and {time.size} columns each, as {_TIME} has instants", str(path))
     ratios = ratio[:, None]
     return JointRecord(path.name, _step(time, path), np.radians(motor), np.radians(joint), torque * ratios, inertia * ratio**2)
 

@@ -51,6 +51,8 @@ def test_rows_and_columns_may_change_places(motion, tmp_path):
         (lambda d: d["para"].update(u=np.array([257.0, 267.0])), "para.u"),
         (lambda d: d["rec"].update(time_cont=np.arange(600.0) ** 2), "even steps"),
         (lambda d: d["rec"].update(act_torque_abs_nm=np.full((3, 600), np.nan)), "torque: values that are not finite"),
+        (lambda d: d["rec"].update(act_torque_abs_nm=np.zeros((600, 3))), "rec.act_torque_abs_nm 600 x 3, allowed is one row a joint"),
+        (lambda d: d["rec"].update(time_cont=d["rec"]["time_cont"].ravel()[:500]), "500 columns each"),
     ],
 )
 def test_a_bad_mat_file_is_named(motion, tmp_path, change, message):
