@@ -79,6 +79,8 @@ sphinx_gallery_conf = {
     "within_subsection_order": "ExampleTitleSortKey",
     "reset_modules": ("matplotlib", "_ext.gallery_style.drawn_in_the_gallerys_style"),
     "plot_gallery": not tags.has("quick"),  # noqa: F821  # Sphinx puts it here
+    # what is printed, and not what the last line of a block happens to return
+    "capture_repr": (),
     "show_memory": False,
     "write_computation_times": False,  # a page that loads its tables' scripts from elsewhere
     "show_signature": False,
