@@ -86,9 +86,9 @@ def _sow(folder: Path, name: str) -> None:
     """Make the folders, and the seeds, where they are not there yet."""
     seeds, corpus = folder / "seeds" / name, folder / "corpus" / name
     (folder / "finds").mkdir(parents=True, exist_ok=True)
-    if not seeds.is_dir():
-        seeds.mkdir(parents=True)
-        corpus.mkdir(parents=True, exist_ok=True)
+    if not any(seeds.glob("*")):
+        for place in (seeds, corpus):
+            place.mkdir(parents=True, exist_ok=True)
         for raw in TARGETS[name].sown(seeds.parent):
             for place in (seeds, corpus):
                 (place / sha256(raw).hexdigest()[:16]).write_bytes(raw)

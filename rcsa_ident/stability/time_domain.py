@@ -43,6 +43,9 @@ _SETTLING = 22.0
 _GONE = 1e-5
 #: In the place of what is larger, or too large to be a number.
 _BEYOND = 1e100
+#: Share of the velocity that rubbing may take in a step, at which limits are those of finer steps to some thousandths; how much finer the
+#: steps become where it takes more.
+_RESOLVED, _FINER = 0.8, (1, 2, 4, 8, 16)
 #: Steps of the ladder of depths.
 _RATIO = 1.2
 
@@ -135,18 +138,26 @@ class TimeDomain:
         limit = np.full(speeds.size, np.inf)
         chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
         flip = np.zeros(speeds.size, dtype=bool)
-        low = stable_depth_bound(modes, process)
+        low, lost = stable_depth_bound(modes, process), 0
         for i in coarse_to_fine(speeds.size):
             speed = float(speeds[i])
-            cut = _Cut(modes, process, speed, self.contact_loss)
-            depth = first_loss(lambda d, cut=cut: cut.growth(d, self.periods), low, process.within_reach(max_depth), self.tolerance, _RATIO)  # type: ignore[misc]
+            for finer in _FINER:
+                cut = _Cut(modes, process, speed, self.contact_loss, finer)
+                depth = first_loss(
+                    lambda d, cut=cut: cut.growth(d, self.periods), low, process.within_reach(max_depth), self.tolerance, _RATIO
+                )  # type: ignore[misc]
+                if depth is None or cut.resolves(depth):
+                    break
+            else:
+                lost += 1
             if depth is not None:
                 limit[i] = depth
                 chatter[i], flip[i] = cut.vibration(depth, self.periods)
                 lobe[i] = int(chatter[i] / (speed * process.cutter.teeth))
             if self.watch is not None:
                 self.watch(speed, float(limit[i]), float(chatter[i]))
-        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, flip=flip)
+        told = f"at {lost} of {speeds.size} speeds the limit is that of the simulation's steps: the worn flank damps more than they resolve"
+        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, warnings=(told,) if lost else (), flip=flip)
 
 
 def milling_history(
@@ -250,7 +261,7 @@ class _Run:
 class _Cut:
     """A speed, with the steps that it is simulated in."""
 
-    def __init__(self, modes: TipModes, process: MillingProcess, speed: float, leaves: bool) -> None:
+    def __init__(self, modes: TipModes, process: MillingProcess, speed: float, leaves: bool, finer: int = 1) -> None:
         self.process, self.speed, self.leaves = process, speed, leaves
         self.feed = process.feed_per_tooth or _FEED
         if process.feed_per_tooth is None and process.cutter.offset:
@@ -272,13 +283,22 @@ class _Cut:
         strength = modes.strength
         self.highest = float(np.max(np.abs(modes.pole)[strength >= _WEAK * strength.max()]))
         slowest = speed * (1.0 - (process.speed_variation.amplitude if process.speed_variation else 0.0))
-        tooth = max(_FEWEST, int(np.ceil(_STEPS * self.highest / (teeth * slowest))))
+        tooth = finer * max(_FEWEST, int(np.ceil(_STEPS * self.highest / (teeth * slowest))))
         #: Steps per revolution and their angle; pitches are whole numbers of steps where the teeth are equally spaced.
         self.per_turn, self.step = tooth * teeth, 2.0 * np.pi / (tooth * teeth)
         period = common_period(process, float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi)
         self.per_period = max(1, round(period / self.step))
         self.tooth_periods = self.per_period / tooth
         self.radius = process.cutter.outline.largest_radius
+
+    def resolves(self, depth: float) -> bool:
+        """Return whether the rubbing of a cut, which is that of the step before, changes the velocity by less than there is in a step."""
+        if self.process.damping is None:
+            return True
+        rub = (2.0 if self.leaves else 1.0) * self.process.damping.strength * depth / (self.radius * self.speed)
+        # what a unit impulse makes of the velocity
+        jump = float(np.max(np.abs(2.0 * ((self.arrays.outputs * self.arrays.pole) @ self.arrays.inputs).real)))
+        return rub * jump * self.step / self.speed < _RESOLVED
 
     def time(self, angle: FloatArray) -> FloatArray:
         """Seconds from the rotation of 0 on."""

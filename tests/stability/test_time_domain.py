@@ -12,6 +12,7 @@ from rcsa_ident.cutting.force import force_history, force_lines, runout_force_li
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
+from rcsa_ident.stability import time_domain
 from rcsa_ident.stability.first_instability import first_loss
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
@@ -97,6 +98,22 @@ def test_what_grows_beyond_all_numbers_is_chatter(rpm, leaves):
     for depth in (10e-3, 60e-3):
         assert 5.0 < cut.growth(depth, 150) < 1000.0
     assert cut.growth(0.1e-3, 150) < 0.0
+
+
+@pytest.mark.slow(20)
+def test_rubbing_that_a_step_does_not_resolve_is_asked_of_finer_steps(monkeypatch):
+    """The flank's force is that of the step before: where it would take most of the velocity, the steps alone had a limit."""
+    asked = tip(PASSING), slow_slot(1e-4), np.array([1600.0]) * RPM, 20e-3
+    found = stability_lobes(*asked, CONTACT)
+    assert found.warnings == ()
+    coarse, fine = (_Cut(*asked[:2], float(asked[2][0]), True, finer) for finer in (1, 8))
+    limit = float(found.limit_depth[0])
+    assert not coarse.resolves(limit)
+    assert fine.growth(0.98 * limit, 150) < 0.0 < fine.growth(1.02 * limit, 150)
+    monkeypatch.setattr(time_domain, "_FINER", (1,))
+    alone = stability_lobes(*asked, CONTACT)
+    assert alone.warnings[0].startswith("at 1 of 1 speeds the limit is that of the simulation's steps")
+    assert alone.limit_depth[0] < 0.9 * limit
 
 
 @pytest.mark.slow
