@@ -29,7 +29,7 @@ from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.units import to_rpm
 
-DEEPEST = 60e-3
+DEEPEST = 20e-3
 SHARES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 
