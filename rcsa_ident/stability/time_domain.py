@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -143,9 +144,8 @@ class TimeDomain:
             speed = float(speeds[i])
             for finer in _FINER:
                 cut = _Cut(modes, process, speed, self.contact_loss, finer)
-                depth = first_loss(
-                    lambda d, cut=cut: cut.growth(d, self.periods), low, process.within_reach(max_depth), self.tolerance, _RATIO
-                )  # type: ignore[misc]
+                growth = partial(cut.growth, periods=self.periods)
+                depth = first_loss(growth, low, process.within_reach(max_depth), self.tolerance, _RATIO)
                 if depth is None or cut.resolves(depth):
                     break
             else:
