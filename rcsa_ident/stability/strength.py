@@ -15,7 +15,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.monodromy import MonodromyOperator
-from rcsa_ident.stability.multiplier_limits import BEFORE, ROUGH, Passage, dominant, longest_step
+from rcsa_ident.stability.multiplier_limits import BEFORE, PASSES, ROUGH, Passage, dominant, longest_step
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod
 from rcsa_ident.stability.tip_modes import TipModes, require_modes
@@ -23,6 +23,8 @@ from rcsa_ident.stability.zero_order import ZeroOrder
 
 #: How far beside a strength that is about right the right one is looked for at first, as a factor.
 _BESIDE = 1.1
+#: Said where it is no multiplier that decides.
+_PASSES = f"the margin is that to a vibration which grows a thousandfold within {PASSES} teeth, although it would die away after them"
 
 
 class Strength(NamedTuple):
@@ -114,14 +116,15 @@ def _by_multipliers(
         return Passage(own, speed, longest_step(own))(depth)
 
     low, high = -search.end, search.end
+    told: tuple[str, ...] = ()
     at = _first(growth, low, high, search)
     high = min(at, high) + float(np.log(BEFORE))
     if high > low and passing(high) >= 0.0:
-        at = _first(passing, low, high, search)
+        at, told = _first(passing, low, high, search), (_PASSES,)
     if np.isinf(at):
         return Strength(search.most, np.nan)
     own = cut(at)
-    return Strength(float(np.exp(at)), dominant(own.multiplier(speed, depth, longest_step(own), start, waves=True)))
+    return Strength(float(np.exp(at)), dominant(own.multiplier(speed, depth, longest_step(own), start, waves=True)), told)
 
 
 def _by_limits(

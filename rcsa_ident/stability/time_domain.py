@@ -295,7 +295,9 @@ class _Cut:
         """Return whether the rubbing of a cut, which is that of the step before, changes the velocity by less than there is in a step."""
         if self.process.damping is None:
             return True
-        rub = (2.0 if self.leaves else 1.0) * self.process.damping.strength * depth / (self.radius * self.speed)
+        widest = self.process.widest
+        engaged = max(1.0, self.process.cutter.teeth * (widest.exit - widest.entry) / (2.0 * np.pi))
+        rub = engaged * (2.0 if self.leaves else 1.0) * self.process.damping.strength * depth / (self.radius * self.speed)
         # what a unit impulse makes of the velocity
         jump = float(np.max(np.abs(2.0 * ((self.arrays.outputs * self.arrays.pole) @ self.arrays.inputs).real)))
         return rub * jump * self.step / self.speed < _RESOLVED

@@ -28,8 +28,8 @@ FEWEST_TEETH_IN_CUT = 1.0
 _PITCH_FACTOR = 30.0
 #: Operations of a march through depths.
 _MARCH = 2500.0
-#: How many times as long as the tip remembers a vibration the next tooth may take until nobody but the surface tells it of that one: with
-#: 8 a vibration grows by less than a thousand before it dies away. Where the tip is asked, as shares of the critical frequency.
+#: How many times as long as the tip remembers a vibration the next tooth may take: about from there on one grew a thousandfold before it
+#: died away, in cuts with one mode by full discretisation. Where the tip is asked, as shares of the critical frequency.
 _FORGOTTEN, _BELOW, _ABOVE = 8.0, 0.8, 1.1
 
 

@@ -80,5 +80,6 @@ def test_vibrations_that_grow_before_they_die_away(near):
     """Three millimetres of a slow slot, worn teeth: no multiplier tells that the limit is near, and the margin does."""
     method, modes, process, speed, depth = FullDiscretisation(), tip(PASSING), slow_slot(1e-4), 1600.0 * RPM, 3e-3
     found = strength(method, modes, process, speed, depth, SEARCH._replace(near=near))
+    assert "grows a thousandfold" in found.warnings[0]
     assert stable(method, modes, process, speed, depth, 0.97 * found.times)
     assert not stable(method, modes, process, speed, depth, 1.03 * found.times)
