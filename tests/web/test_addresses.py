@@ -105,3 +105,24 @@ def test_how_far_back_the_changes_go(opened, client: Client):
     assert shown > 50
     again = opened(address(page))
     expect(again.locator("tbody tr")).to_have_count(shown)
+
+
+_LATE = """async (kept) => {
+  const main = document.querySelector('script[type=module]').src;
+  const { remember } = await import(main.replace('main.js', 'router.js'));
+  if (kept) return remember('robots', { robot: 'kr500' });
+  location.hash = '#/changes';
+  remember('robots', { robot: 'tx200' });
+}"""
+
+
+def test_an_answer_that_comes_late_leaves_the_next_address_alone(opened):
+    """Between the click that leaves a view and the next view, and after it; while the view is there it writes its own."""
+    page = opened("#/robots")
+    page.evaluate(_LATE, True)
+    assert address(page) == "#/robots?robot=kr500"
+    page.evaluate(_LATE, False)
+    expect(page.locator("h1")).to_have_text("Changes")
+    assert address(page) == "#/changes"
+    page.evaluate(_LATE, True)
+    assert address(page) == "#/changes"

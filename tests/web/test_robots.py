@@ -14,11 +14,12 @@ from rcsa_ident.machine.robot.kinematics import tool_point_at
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.robots import ROBOTS, robot
 from tests.fixtures.service import Served
+from tests.fixtures.waiting import until
 from tests.web.conftest import drop
 from tests.web.test_accessibility import looks, violations
 
 pytest.importorskip("playwright")
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 START = [-11.71, 20.78, 110.0, 82.76, 60.8, -166.96]
 PATH = "x_mm,y_mm,z_mm\n" + "\n".join(f"{900 + 100 * k},{-300 + 150 * k},500" for k in range(5)) + "\n"
@@ -104,6 +105,26 @@ def test_lobes_follow_the_posture(page: Page, client: Client, tooling: str):
     assert "+110+" in page.url
     page.get_by_label("J3, degrees").fill("90")
     expect(page.locator(".joint .fault:visible")).to_have_count(0)
+
+
+def test_of_two_arms_asked_for_the_later_one_is_drawn(page: Page):
+    """The answer for the first comes last, or not at all."""
+    held: dict[str, Route] = {}
+
+    def hold(route: Route) -> None:
+        held[route.request.post_data_json["robot"]["robot"]] = route
+
+    page.route("**/robots/posture", hold)
+    arm = page.get_by_label("Arm", exact=True)
+    for name in ("kr500", "tx200"):
+        arm.select_option(name)
+        until(lambda name=name: page.wait_for_timeout(20) or name in held)
+    for name in ("tx200", "kr500"):
+        held[name].continue_()
+    expect(page).to_have_url(re.compile("robot=tx200"))
+    expect(page.get_by_label("J6", exact=True)).to_be_visible()
+    page.wait_for_timeout(500)
+    expect(page.get_by_label("A6", exact=True)).to_have_count(0)
 
 
 def test_inches_turn_over_and_a_field_at_fault_says_so(page: Page):

@@ -55,10 +55,14 @@ window.addEventListener("beforeunload", (event) => {
   if (unsaved()) event.preventDefault();
 });
 
+const here = () => location.hash || "#/";
+
 /** Write what a view shows into its address, without a step back for every keystroke. */
 export function remember(path, query) {
-  address = to(path, query);
-  history.replaceState(null, "", address);
+  // a view that waited for an answer may have been left, or be about to: the next one's address is not its own
+  if (where().path !== path || here() !== address) return;
+  history.replaceState(null, "", to(path, query));
+  address = here();
 }
 
 /** Write some of what a view shows into its address; what is empty stands there no more. */
@@ -74,7 +78,7 @@ export async function show(place, onshow, onerror) {
   const { path, query } = where();
   ends?.();
   ends = null;
-  address = location.hash || "#/";
+  address = here();
   holdsEdits(() => false);
   for (const { shape, names, section, view } of routes) {
     const found = shape.exec(path);

@@ -40,7 +40,7 @@ export async function trail(wanted = {}, count = SOME, onmore = () => {}) {
     "click",
     busy(earlier, async () => {
       await more();
-      onmore(changes.length);
+      if (list.isConnected) onmore(changes.length);
     }),
   );
   do await more();

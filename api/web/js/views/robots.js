@@ -98,7 +98,7 @@ export async function view(_args, query, place) {
   }
 
   /** Take another arm, at the angles of the address or at some of its own. */
-  async function load(written) {
+  function load(written) {
     for (const name of Object.keys(timers)) {
       clearTimeout(timers[name]);
       running[name]?.abort();
@@ -112,20 +112,19 @@ export async function view(_args, query, place) {
     const usable = given.length === chosen.joints && given.every(Number.isFinite);
     sliders.angles = usable ? given : (PUBLISHED[chosen.name]?.slice(0, chosen.joints) ?? []);
     if (sliders.angles.length !== chosen.joints) sliders.angles = Array(chosen.joints).fill(0);
-    await redrawn(true);
+    redrawn(true);
   }
 
   /** Ask for the drawing, too: of another arm, or with another tool on it. */
-  async function redrawn(anew) {
-    try {
-      const found = await askPosture(undefined, true);
+  function redrawn(anew) {
+    const draw = async (signal) => {
+      const found = await askPosture(signal, true);
       if (anew) sliders.build(joints, sliders.angles);
       picture.show({ drawing: found.drawing, angles: sliders.angles });
       remember("robots", form.state());
       later("lobes", askLobes, 0);
-    } catch (error) {
-      if (!showsIn(error)) failed(fault, error);
-    }
+    };
+    later("drawing", draw, 0);
   }
 
   function asked(tool) {
@@ -221,7 +220,7 @@ export async function view(_args, query, place) {
   }
 
   if (!toolings.length) zone.before(note("", h("p", null, "No tooling yet: with one, lobes follow the posture. ", link(to("toolings"), "To the toolings"))));
-  await load(query.get("q"));
+  load(query.get("q"));
   return () => {
     for (const name of Object.keys(timers)) {
       clearTimeout(timers[name]);
