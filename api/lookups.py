@@ -16,12 +16,14 @@ from api.reading.campaign_text import campaign_of_text
 from api.reading.reader_tasks import recording_and_air
 from api.reading.stored import found_of, samples_of
 from api.schemas.robots import Posed, RobotKeys
+from api.schemas.tips import TappedTip
 from api.schemas.toolings import ToolingKeys
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Machine, digest_of, summary_of
 from api.work.forces import ReadPair
 from api.work.requests import MachineText, ToolingSource
 from api.work.robots import parsed, posed_text
+from api.work.tips import tapped_text
 from rcsa_ident.errors import InputError
 from rcsa_ident.sample_files import sample_robots
 from rcsa_ident.signals.recording import Sensor
@@ -58,10 +60,18 @@ def posed_robot(components: Components, group: str, asked: Posed) -> MachineText
     return MachineText(digest_of(text), text)
 
 
-def tip_source(components: Components, group: str, machine: str | None, robot: Posed | None) -> tuple[MachineText, str]:
-    """Return what a tooling is asked on, a machine or a robot at a posture, and what the answer calls it."""
-    if (machine is None) == (robot is None):
-        raise InputError("machine", "nothing" if machine is None else "given beside robot", "a machine, or a robot at a posture")
+def tip_source(
+    components: Components, group: str, machine: str | None, robot: Posed | None, tip: TappedTip | None = None
+) -> tuple[MachineText, str]:
+    """Return what a tooling is asked on, a machine, a robot at a posture or its tapped tip, and what the answer calls it."""
+    given = [name for name, value in (("machine", machine), ("robot", robot), ("tip", tip)) if value is not None]
+    if len(given) != 1:
+        found = f"given beside {given[1]}" if given else "nothing"
+        allowed = "a machine, or a robot at a posture; FRFs, lobes and advice are told of a tapped tip, too"
+        raise InputError(given[0] if given else "machine", found, allowed)
+    if tip is not None:
+        text = tapped_text(tip.keys())
+        return MachineText(digest_of(text), text), "tip"
     if robot is not None:
         name = robot.robot if isinstance(robot.robot, str) else robot.robot.robot.name
         return posed_robot(components, group, robot), name
@@ -77,6 +87,20 @@ def tooling_source(components: Components, group: str, tooling: str | ToolingKey
     if document is None:
         raise Problem(404, f"there is no tooling {tooling}")
     return ToolingSource(tooling, document.text)
+
+
+def asked_toolings(
+    components: Components, group: str, toolings: Sequence[str | ToolingKeys], tip: TappedTip | None, field: str
+) -> list[ToolingSource]:
+    """Return the toolings of a field of a query, or the cutter of a tip in their place."""
+    if tip is not None and len(toolings) + (tip.cutter is not None) != 1:
+        beside = "" if tip.cutter is None else " beside tip.cutter"
+        raise InputError(field, f"{len(toolings)} of them{beside}", "the one that was tapped, or in its place tip.cutter")
+    if tip is not None and tip.cutter is not None:
+        return [ToolingSource(tip.name, keys={"cutter": tip.cutter.model_dump(exclude_unset=True, exclude_none=True)})]
+    if not toolings:
+        raise InputError(field, "nothing", "a tooling, by its name in the library or as it is")
+    return [tooling_source(components, group, tooling, i + 1) for i, tooling in enumerate(toolings)]
 
 
 def known_campaign(components: Components, group: str, id: str) -> Campaign:

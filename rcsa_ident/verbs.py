@@ -238,16 +238,10 @@ def read_tap_tests(
     >>> print(ri.read_tap_tests(y=tip, from_hz=50.0))
     tip.x, tip.y: 12545 frequencies, 51 to 25600 Hz
     """
-    from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io import frf_files
-    from rcsa_ident.machine.known_tip import measured_tip
+    from rcsa_ident.io.frf_files import Source, read_tapped_tip
 
     given = {("X", "X"): x, ("Y", "Y"): y, ("X", "Y"): xy, ("Y", "X"): yx}
-    tests = frf_files.read_tap_tests(
-        [frf_files.Source(Path(path), pair) for pair, path in given.items() if path is not None], units, from_hz
-    )
-    curves = {(Dof(a.lower()), Dof(b.lower())): curve for (a, b), curve in tests.items()}
-    return measured_tip({a: c for (a, b), c in curves.items() if a is b}, {pair: c for pair, c in curves.items() if pair[0] is not pair[1]})
+    return read_tapped_tip([Source(Path(path), pair) for pair, path in given.items() if path is not None], units, from_hz)
 
 
 def advise(

@@ -96,5 +96,5 @@ def read(model: type[Model], answer: httpx2.Response) -> Model:
 
 
 def standing_on(machine: str | Json) -> dict[str, Any]:
-    """Return the key of a query that says what a tooling stands on: a machine by its id, or a robot at a posture."""
-    return {"machine": machine} if isinstance(machine, str) else {"robot": machine}
+    """Return the key of a query that says what a tooling stands on: a machine by its id, a robot at a posture, or FRFs of its tip."""
+    return {"machine": machine} if isinstance(machine, str) else {"tip" if "frf" in machine else "robot": machine}

@@ -261,11 +261,11 @@ class Client(Uploads, Jobs):
         """Delete a tooling."""
         self.send("DELETE", f"/toolings/{name}", headers=match(seen))
 
-    def tooltip(self, machine: str | Json, tooling: str | Json, **further: Any) -> TipAnswer:
-        """Return a tooltip FRF, on a machine by its id or on a robot at a posture, as `posture` takes it."""
+    def tooltip(self, machine: str | Json, tooling: str | Json | None = None, **further: Any) -> TipAnswer:
+        """Return a tooltip FRF, on a machine by its id, on a robot at a posture, as `posture` takes it, or a tapped one."""
         return read(TipAnswer, self.send("POST", "/tooltip", json={**standing_on(machine), "tooling": tooling, **further}))
 
-    def tooltip_file(self, machine: str | Json, tooling: str | Json, **further: Any) -> str:
+    def tooltip_file(self, machine: str | Json, tooling: str | Json | None = None, **further: Any) -> str:
         """Return the text of FRF.csv."""
         body = {**standing_on(machine), "tooling": tooling, **further}
         return self.send("POST", "/tooltip", json=body, headers={"Accept": "text/csv"}).text

@@ -87,8 +87,12 @@ def carry(job: Job, context: JobContext) -> Outcome:
 
 
 def _called(job: Job) -> str:
-    """What an answer calls the machine, or the robot."""
+    """What an answer calls the machine, the robot or the tip."""
     if job.machine:
         return job.machine
-    robot = json.loads(job.request)["robot"]["robot"]
+    asked = json.loads(job.request)
+    # a job of an earlier release knows no tip
+    if asked.get("tip") is not None:
+        return "tip"
+    robot = asked["robot"]["robot"]
     return str(robot if isinstance(robot, str) else robot["robot"]["name"])

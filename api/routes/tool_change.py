@@ -15,7 +15,7 @@ from api.components import Components, ThisService
 from api.conventions import BODY, Repeat, guard, problems, while_there
 from api.jobs.lobes import asked
 from api.live import jobs
-from api.lookups import tip_source, tooling_source
+from api.lookups import asked_toolings, tip_source
 from api.schemas.jobs import JobAnswer, LobeJob
 from api.schemas.queries import AdviceAnswer, AdviceQuery, LobeAnswer, LobeQuery, TipAnswer, TipQuery
 from api.schemas.toolings import ToolingKeys
@@ -41,7 +41,7 @@ Later = Annotated[str | None, Header(alias="Prefer", max_length=200, description
     responses={200: {"description": "Receptances.", "content": {CSV: {"schema": {"type": "string"}}}}, **problems(404, *BODY)},
 )
 async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: WhoAsks) -> Any:
-    machine, _, (tooling,) = await _subject(parts, caller.group, body, [body.tooling])
+    machine, _, (tooling,) = await _subject(parts, caller.group, body, [] if body.tooling is None else [body.tooling])
     csv = CSV in request.headers.get("accept", "")
     found = parts.work.run(tasks.tooltip, machine, tooling, body.request(parts.settings.work_seconds), csv)
     answer = await while_there(request, found)
@@ -138,11 +138,10 @@ async def _each(parts: Components, call: Any, machine: MachineText, toolings: li
 async def _subject(
     parts: Components, group: str, body: TipQuery | LobeQuery | AdviceQuery, toolings: list[str | ToolingKeys]
 ) -> tuple[MachineText, str, list[ToolingSource]]:
-    """Return the machine or the robot, what it is called, and the toolings, each from the library or as it came."""
+    """Return the machine, the robot or the tip, what it is called, and the toolings, each from the library or as it came."""
 
     def look() -> tuple[MachineText, str, list[ToolingSource]]:
-        return *tip_source(parts, group, body.machine, body.robot), [
-            tooling_source(parts, group, tooling, i + 1) for i, tooling in enumerate(toolings)
-        ]
+        field = "tooling" if isinstance(body, TipQuery) else "toolings"
+        return *tip_source(parts, group, body.machine, body.robot, body.tip), asked_toolings(parts, group, toolings, body.tip, field)
 
     return await run_in_threadpool(look)

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field
 from api.schemas.common import Answer, Body, EngagementRows, Id, Line, Name
 from api.schemas.machines import Curve
 from api.schemas.robots import Posed
+from api.schemas.tips import TappedTip
 from api.schemas.toolings import EXAMPLE, ToolingKeys
 from api.work.requests import AdviceRequest, LobeRequest, TipRequest
 from rcsa_ident.cutting.conditions import Block, Engagement
@@ -39,17 +40,19 @@ Depth = Annotated[float, Field(gt=0.0, le=500.0)]
 Tooling = Annotated[Name | ToolingKeys, Field(description="Name in the library, or the tooling itself.")]
 OnMachine = Annotated[Id | None, Field(description="Id of a machine; in its place `robot` takes an arm at a posture.")]
 OnRobot = Annotated[Posed | None, Field(description="In place of a machine.")]
+OnTip = Annotated[TappedTip | None, Field(description="In place of a machine: tap tests of the only tooling, or of a cutter.")]
 Spread = Annotated[Percent, Field(description="How well the tool-holder's stiffness is known [%]: part of the bands.")]
 
 
 class TipQuery(Body):
-    """Which tip at which frequencies."""
+    """Which tip at which frequencies; a tapped one answers at its own."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"machine": "m1", "tooling": EXAMPLE, "to_hz": 4000.0}]})
 
     machine: OnMachine = None
     robot: OnRobot = None
-    tooling: Tooling
+    tip: OnTip = None
+    tooling: Tooling | None = None
     from_hz: Hertz | None = Field(None, description="By default 100, or where a measured flange begins.")
     to_hz: Hertz | None = Field(None, description="By default the end of the identified band.")
     step_hz: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
@@ -186,7 +189,8 @@ class Milled(Body):
 
     machine: OnMachine = None
     robot: OnRobot = None
-    toolings: list[Tooling] = Field(min_length=1, max_length=MOST_TOOLINGS, description="Several are compared.")
+    tip: OnTip = None
+    toolings: list[Tooling] = Field(default=[], max_length=MOST_TOOLINGS, description="Several are compared; none with a tip's cutter.")
     cut: Cut = Field(default_factory=Cut)
     speeds: Speeds = Field(default_factory=Speeds)
     max_depth_mm: Depth = 10.0
@@ -206,7 +210,7 @@ class Milled(Body):
             str(self.method),
             self.bands,
             self.stiffness_spread_percent / 100.0,
-            work_seconds / len(self.toolings),
+            work_seconds / max(len(self.toolings), 1),
         )
 
 
@@ -313,7 +317,7 @@ class ToolingLobes(Answer):
 class LobeAnswer(Answer):
     """Lobes of all toolings, in the order of the query."""
 
-    machine: str = Field(description="Its id, or the robot's name.")
+    machine: str = Field(description="Its id, the robot's name, or `tip`.")
     toolings: list[ToolingLobes]
 
 
@@ -407,7 +411,7 @@ class ToolingAdvice(Answer):
     """Advice for a tooling."""
 
     tooling: str
-    stickout_mm: float
+    stickout_mm: float | None = Field(description="null of a cutter alone.")
     lowest_limit_mm: float | None
     common_stable_depth_mm: float | None = Field(description="Stable at every speed with all possible machines and cutting coefficients.")
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
@@ -422,5 +426,5 @@ class ToolingAdvice(Answer):
 class AdviceAnswer(Answer):
     """Advice for all toolings, in the order of the query."""
 
-    machine: str = Field(description="Its id, or the robot's name.")
+    machine: str = Field(description="Its id, the robot's name, or `tip`.")
     toolings: list[ToolingAdvice]

@@ -48,7 +48,10 @@ class TooLong(InputError):
 
 @dataclass(frozen=True, slots=True)
 class MachineText:
-    """What is known of a machine, as it is kept: RESULT.json, FLANGE.csv or a robot at a posture. By the digest a worker knows it."""
+    """What is known of a machine: RESULT.json, FLANGE.csv, or in its place a robot at a posture or a tapped tip.
+
+    By the digest a worker knows it.
+    """
 
     digest: str
     text: str

@@ -12,6 +12,7 @@ import numpy as np
 
 from api.work.machine_cache import MachineCache, is_result, parsed, read
 from api.work.requests import AdviceRequest, LobeRequest, MachineText, TipRequest, ToolingSource, TooLong
+from api.work.tips import is_tapped, tapped
 from api.work.toolings import tooling_from, weigh
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.power import SpindleDrive
@@ -21,7 +22,7 @@ from rcsa_ident.machine.machine import Machine
 from rcsa_ident.report.summaries import advice_summary, frf_summary, lobes_curves, lobes_summary
 from rcsa_ident.stability.methods import Watch
 from rcsa_ident.units import from_hz, to_hz, to_rpm
-from rcsa_ident.workflows.tool_change import ToolChange, advise, spread_seconds
+from rcsa_ident.workflows.tool_change import TipAnswer, ToolChange, advise, spread_seconds
 from rcsa_ident.workflows.tool_change import tooltip as ask_tip
 
 MOST_LINES = 20_000
@@ -110,21 +111,29 @@ def flange_frf(machine: MachineText, lines: tuple[float | None, float | None, fl
 
 
 def tooltip(machine: MachineText, tooling: ToolingSource, request: TipRequest, csv: bool = False) -> Any:
-    """Return the tooltip FRF with standard deviations, as a table or as the text of FRF.csv."""
+    """Return the tooltip FRF with standard deviations, as a table or as the text of FRF.csv; one that was tapped as it is."""
+    if is_tapped(machine.text):
+        found = ask_tip(tapped(machine.text), tooling_from(tooling, tip_known=True))
+    else:
+        found = _predicted(machine, tooling, request)
+    if not csv:
+        told = {"tooling": found.tooling.name, "warnings": list(found.remarks)} | _speed(found.speed)
+        return told | frf_summary(found.tip, found.tip.rows)
+    with tempfile.TemporaryDirectory(prefix="rcsa-ident-") as folder:
+        path = Path(folder) / "FRF.csv"
+        write_tip_csv(path, found.tip)
+        return path.read_text(encoding="utf-8")
+
+
+def _predicted(machine: MachineText, tooling: ToolingSource, request: TipRequest) -> TipAnswer:
+    """The tip of a tooling on a machine, after a look at what it will cost."""
     known = _machines.get(machine, request.bands)
     omega = _lines(known, request.low, request.high, request.step)
     tool = tooling_from(tooling)
     weigh(tool.assembly, to_hz(float(omega[-1])))
     if request.bands and not (known.prepared and np.array_equal(omega, known.lines())):
         _affordable(spread_seconds(known, omega), f"{omega.size} frequencies with bands", request.work_seconds)
-    found = ask_tip(known, tool, omega, request.speed, request.bands, request.stiffness_spread)
-    if not csv:
-        told = {"tooling": tool.name, "warnings": list(found.remarks)} | _speed(found.speed)
-        return told | frf_summary(found.tip, found.tip.rows)
-    with tempfile.TemporaryDirectory(prefix="rcsa-ident-") as folder:
-        path = Path(folder) / "FRF.csv"
-        write_tip_csv(path, found.tip)
-        return path.read_text(encoding="utf-8")
+    return ask_tip(known, tool, omega, request.speed, request.bands, request.stiffness_spread)
 
 
 def _speed(speed: float | None) -> dict[str, float | None]:
@@ -150,10 +159,12 @@ def advice(machine: MachineText, tooling: ToolingSource, request: AdviceRequest)
 
 
 def _change(machine: MachineText, tooling: ToolingSource, request: LobeRequest) -> ToolChange:
-    """What is asked of a machine and a tooling, after a look at what it will cost."""
-    known = _machines.get(machine, request.bands)
-    asked = request.change(known, tooling_from(tooling))
-    weigh(asked.tooling.assembly, to_hz(float(asked.omega[-1])))
+    """What is asked of a machine and a tooling, or of a tip that is known and its cutter, after a look at what it will cost."""
+    if is_tapped(machine.text):
+        asked = request.change(tapped(machine.text), tooling_from(tooling, tip_known=True))
+    else:
+        asked = request.change(_machines.get(machine, request.bands), tooling_from(tooling))
+        weigh(asked.tooling.assembly, to_hz(float(asked.omega[-1])))
     _affordable(asked.seconds, f"{len(request.speeds)} speeds by {request.method}", request.work_seconds)
     return asked
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 from api.work.requests import ToolingSource
@@ -26,10 +25,10 @@ def tooling_of(text: str) -> Tooling:
     return setups.tooling_of(parsed(text), "", "tooling")
 
 
-def tooling_from(source: ToolingSource) -> Tooling:
-    """Return a tooling of a query, called as there; errors name key or line."""
-    tooling = tooling_of(source.text) if source.keys is None else setups.tooling_of(source.keys, "", "tooling")
-    return replace(tooling, name=source.name)
+def tooling_from(source: ToolingSource, tip_known: bool = False) -> Tooling:
+    """Return a tooling of a query, called as there; errors name key or line. Where its tip is known it may be a cutter alone."""
+    keys = parsed(source.text) if source.keys is None else source.keys
+    return setups.tooling_of({**keys, "name": source.name}, "", "tooling", tip_known)
 
 
 def parsed(text: str) -> dict[str, Any]:

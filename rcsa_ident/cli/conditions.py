@@ -76,13 +76,9 @@ def _known_tip(options: TipOptions) -> TipSource:
 
 def idle_tip(texts: Sequence[str], units: str | None = None, from_hz: float | None = None) -> Receptance:
     """Return the tip's receptance from tap tests, each written as with --frf."""
-    from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io.frf_files import read_tap_tests
-    from rcsa_ident.machine.known_tip import measured_tip
+    from rcsa_ident.io.frf_files import read_tapped_tip
 
-    found = read_tap_tests([frf_source(text) for text in texts], units, from_hz or 0.0)
-    pairs = {(Dof(a.lower()), Dof(b.lower())): curve for (a, b), curve in found.items()}
-    return measured_tip({a: c for (a, b), c in pairs.items() if a is b}, {pair: c for pair, c in pairs.items() if pair[0] is not pair[1]})
+    return read_tapped_tip([frf_source(text) for text in texts], units, from_hz or 0.0)
 
 
 def frf_source(text: str) -> Any:

@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import AXES, FREQUENCY, read_frf_csv
 from rcsa_ident.io.files import MEGABYTE, read_bytes
@@ -29,6 +31,7 @@ from rcsa_ident.io.uff import (
     read_uff,
 )
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.machine.known_tip import measured_tip
 
 _STANDARD_GRAVITY = 9.80665
 _INCH = 0.0254
@@ -119,6 +122,13 @@ def read_tap_tests(
                 raise InputError("frf_from_hz", f"{from_hz:g}", f"a frequency below the last, {test.frequency[-1]:g} Hz", test.where)
             found[pair] = test.frequency[kept], test.values[kept]
     return found
+
+
+def read_tapped_tip(sources: Sequence[Source], units: str | None = None, from_hz: float = 0.0) -> Receptance:
+    """Return the tip's receptance of files, over X and Y, and over Z where it was hit there; see `read_tap_tests`."""
+    found = read_tap_tests(sources, units, from_hz)
+    curves = {(Dof(a.lower()), Dof(b.lower())): curve for (a, b), curve in found.items()}
+    return measured_tip({a: c for (a, b), c in curves.items() if a is b}, {pair: c for pair, c in curves.items() if pair[0] is not pair[1]})
 
 
 def pair_name(pair: tuple[str, str]) -> str:

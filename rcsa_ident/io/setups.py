@@ -87,14 +87,10 @@ def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
     >>> print(ri.read_tooling("data/machines/toolings/S3-PG25-long.toml"))
     S3-PG25-long: 4 teeth, Ø12 mm, helix 30°, stickout 65.9 mm, insertion 44 mm, holder 100 mm
     """
-    data = read_toml(path, "tooling")
-    if tip_known and "tool" not in data and "holder" not in data:
-        top = Table(data, str(path), known=_TOOLING)
-        return BareCutter(top.text("name", Path(path).stem), cutter_of(top.table("cutter", CUTTER_KEYS)))
-    return tooling_of(data, str(path), Path(path).stem)
+    return tooling_of(read_toml(path, "tooling"), str(path), Path(path).stem, tip_known)
 
 
-def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
+def tooling_of(data: Mapping[str, Any], where: str, name: str, tip_known: bool = False) -> Tooling:
     """Return the tooling of a table of keys as `read_tooling` finds it in a file; `name` counts where the table has none.
 
     Parameters
@@ -105,8 +101,12 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
         The file, for the messages.
     name : str
         Counts where the table has none.
+    tip_known : bool
+        As of `read_tooling`.
     """
     top = Table(data, where, known=_TOOLING)
+    if tip_known and "tool" not in data and "holder" not in data:
+        return BareCutter(top.text("name", name), cutter_of(top.table("cutter", CUTTER_KEYS)))
     materials = material_library(top)
     tool = top.table("tool", ("stickout_mm", "segments", "model"))
     holder = top.table("holder", ("insertion_mm", "segments", "model", "taper"))

@@ -57,6 +57,7 @@ def views(machine: str, campaign: str, job: str) -> dict[str, str]:
         "live": "#/forces/live",
         "listen": "#/listen",
         "tap": "#/tap",
+        "tip": "#/tip",
         "paths": "#/paths?ask=removal&tooling=Example S3-PG25-long",
         "robots": "#/robots?robot=tx200&tooling=Example S3-PG25-long",
     }

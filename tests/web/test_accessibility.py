@@ -70,6 +70,8 @@ def test_empty_views_and_dialogs(opened, served: Served, client: Client):
     found["dialog"] = violations(page)
     page.get_by_role("button", name="Keep it").click()
     page.goto(f"{served.url}/#/toolings/new")
+    # the drawing comes a little later and moves what is below it
+    shots.settled(page)
     page.get_by_role("button", name="Put into the library").click()
     page.locator(".fault:visible").first.wait_for()
     found["faults"] = violations(page)

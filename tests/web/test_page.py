@@ -28,7 +28,7 @@ def plain(text: str) -> str:
 def views(shop: str) -> list[str]:
     return [
         "#/", f"#/machines/{shop}", "#/recordings", "#/campaigns/new", "#/identification", "#/toolings", "#/toolings/new",
-        "#/toolings/edit/T1", "#/change?tooling=T1&tooling=T1-long", "#/forces", "#/forces/live", "#/listen", "#/tap",
+        "#/toolings/edit/T1", "#/change?tooling=T1&tooling=T1-long", "#/forces", "#/forces/live", "#/listen", "#/tap", "#/tip",
     ]  # fmt: skip
 
 

@@ -43,6 +43,7 @@ route("change", "change", ofMachine(view("change")));
 route("card", "change", view("tool_card"));
 route("listen", "listen", view("listen"));
 route("tap", "listen", view("tap"));
+route("tip", "listen", view("tip"));
 route("forces", "forces", ofMachine(view("forces")));
 route("forces/live", "forces", ofMachine(view("live")));
 

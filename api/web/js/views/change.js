@@ -1,17 +1,12 @@
 // After a tool change: what is asked on the left, what it means for the cut on the right.
-import { all, get, Problem } from "../api.js";
-import { add, empty, h, head, link } from "../dom.js";
-import { busy, clearFaults, showProblem } from "../forms.js";
+import { all, get } from "../api.js";
+import { add, empty, head, link } from "../dom.js";
 import { nextStep } from "../next_step.js";
 import { remember, to } from "../router.js";
 import { machine } from "../state.js";
-import { answers, standing } from "./change_answers.js";
-import { changeForm } from "./change_form.js";
+import { changeForm, toolingPicks } from "./change_form.js";
 import { methods } from "./change_question.js";
-import { results } from "./change_results.js";
-import { notComputed } from "./headline.js";
-
-const BEFORE = "What stands below answers the question before.";
+import { lobesBench } from "./lobes_bench.js";
 
 export async function view(_args, query, place) {
   const [toolings, { items: materials }, kinds] = await Promise.all([all("toolings"), get("materials"), methods()]);
@@ -28,94 +23,18 @@ export async function view(_args, query, place) {
       ),
     );
   }
-
-  const form = changeForm({ machine: here, toolings, materials, kinds, query, onchange: changed });
-  const found = h("div", { class: "change-results", "aria-live": "off" });
-  const told = standing(stop);
-  add(place, h("div", { class: "change" }, form.element, h("div", { class: "change-answer" }, told.element, found)));
-
-  // how the answer is looked at
-  const look = { parts: query.get("frf") === "cartesian" ? "cartesian" : "polar", shown: query.get("axes") ?? "both", at: number(query.get("at")) };
-  look.keep = () => {
-    const parts = look.parts === "polar" ? null : look.parts;
-    remember("change", { ...form.state(), frf: parts, axes: look.shown === "both" ? null : look.shown, at: look.at });
+  const on = { machine: here.id };
+  const subject = {
+    ...toolingPicks(toolings, query, () => bench.changed(true)),
+    body: () => on,
+    address: () => on,
+    // a measured flange says nothing of a workpiece
+    material: here.identification.status === "measured" ? null : "As in the identification",
+    shaped: toolings.some((tooling) => tooling.shape !== "flat"),
   };
-  let running = null;
-  let timer = null;
-  /** Whether what is shown answers what is asked. */
-  const mark = (current) => found.classList.toggle("before", !current && found.childElementCount > 0);
-
-  async function compute() {
-    clearTimeout(timer);
-    look.keep();
-    form.tell();
-    running?.abort();
-    const mine = (running = new AbortController());
-    const { signal } = mine;
-    clearFaults(form.element);
-    told.clear();
-    mark(false);
-    const problem = form.problem();
-    if (problem) {
-      if (found.childElementCount) told.say(BEFORE);
-      return void showProblem(form.element, problem, { focus: false });
-    }
-    const late = setTimeout(() => told.computing(found.childElementCount > 0), found.childElementCount ? 400 : 0);
-    let drawn = null;
-    const heard = {
-      told: (job) => signal.aborted || told.job(job, form.body().lobes.method),
-      part: (partial) => signal.aborted || drawn.part(partial),
-    };
-    const body = form.body();
-    try {
-      for await (const answer of answers(body, signal, heard)) {
-        clearTimeout(late);
-        if (signal.aborted) return;
-        told.clear();
-        mark(true);
-        drawn = results(found, answer, { toolings, body, tested: form.tested, ontested, look });
-      }
-    } catch (error) {
-      clearTimeout(late);
-      if (error.name === "AbortError" || signal.aborted) return;
-      mark(false);
-      told.refused(error instanceof Problem ? error.message : "Something went wrong on this page.");
-      if (!(error instanceof Problem)) console.error(error);
-      else showProblem(form.element, error, { focus: document.activeElement === form.button });
-    }
-  }
-
-  function stop() {
-    running?.abort();
-    told.say("Stopped. “Compute” asks again.");
-    for (const best of found.querySelectorAll(".best[aria-busy]")) notComputed(best);
-  }
-
-  function ontested(next) {
-    form.tested = next;
-    compute();
-  }
-
-  function changed(now = false) {
-    clearTimeout(timer);
-    if (form.slow()) {
-      look.keep();
-      // what is shown answers something else, and its job works for nobody
-      running?.abort();
-      told.clear();
-      mark(false);
-      return void (found.childElementCount && told.say(`${BEFORE} “Compute” asks this one.`));
-    }
-    timer = setTimeout(compute, now ? 0 : 450);
-  }
-
-  form.element.addEventListener("submit", busy(form.button, compute));
-  compute();
-  return () => {
-    clearTimeout(timer);
-    running?.abort();
-    told.clear();
-  };
+  const form = changeForm({ subject, materials, kinds, query, onchange: (now) => bench.changed(now) });
+  const bench = lobesBench({ form, toolings: () => toolings, query, keep: (state) => remember("change", state) });
+  add(place, bench.element);
+  bench.begin();
+  return bench.end;
 }
-
-const number = (written) => (written === null || written === "" || !Number.isFinite(Number(written)) ? null : Number(written));

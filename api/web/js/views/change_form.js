@@ -14,10 +14,11 @@ const FURTHER = ["method", "material", "deep", "ktc", "krc", "kac", "runout", "l
 /**
  * The form: `element`, `button`, `state()` for the address, `body()` for the service, `problem()`, `slow()`, `tested`, `tell()`.
  * `onchange(now)` is called when something else is asked.
+ *
+ * The subject is what is asked about: `element` to choose it by, `names()` of toolings, `faults()`, `body()` and `address()` of what they
+ * stand on, `material` in words where that says which is cut, `shaped` where a cutter may be no cylinder.
  */
-export function changeForm({ machine, toolings, materials, kinds, query, onchange }) {
-  const named = query.getAll("tooling").filter((name) => toolings.some((tooling) => tooling.name === name));
-  const chosen = new Set(named.length ? named.slice(0, MOST) : [newest(toolings).name]);
+export function changeForm({ subject, materials, kinds, query, onchange }) {
   const fields = Object.fromEntries(
     NUMBERS.map(([key, kind, usual, name, , , label]) => {
       const given = query.get(key);
@@ -42,13 +43,10 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
   ];
   const stock = picked("stock", stocks, "");
   // along a wall a block is but another radial immersion
-  const shaped = toolings.some((tooling) => tooling.shape !== "flat") || stock.value !== "";
+  const shaped = subject.shaped || stock.value !== "";
   const direction = picked("fd", ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]), "+X");
   const method = picked("method", kinds, QUICK);
-  // a measured flange says nothing of a workpiece
-  const measured = machine.identification.status === "measured";
-  const unsaid = measured ? "Choose one, or write coefficients" : "As in the identification";
-  const material = picked("material", [["", unsaid], ...materials.map((each) => [each.name, each.name])], "");
+  const material = picked("material", [["", subject.material ?? "Choose one, or write coefficients"], ...materials.map((each) => [each.name, each.name])], "");
   const button = h("button", { class: "primary" }, "Compute");
   const form = { tested: { name: query.get("cutfile") ?? "", cuts: fromAddress(query.get("cuts") ?? "") }, button };
   const slow = () => method.value !== QUICK;
@@ -104,17 +102,11 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
   const element = h(
     "form",
     { class: "card change-form", novalidate: true },
-    h(
-      "fieldset",
-      { "data-field": "toolings" },
-      h("legend", null, "Toolings"),
-      toolingPicks(toolings, chosen, () => onchange(true)),
-      h("div", { class: "fault", id: "toolings-fault", hidden: true }),
-    ),
+    subject.element,
     conditions,
     h(
       "details",
-      { open: measured || FURTHER.some((key) => query.has(key) && query.get(key) !== QUICK) },
+      { open: subject.material === null || FURTHER.some((key) => query.has(key) && query.get(key) !== QUICK) },
       h("summary", null, "Material, spindle, method"),
       field("Material", material, { name: "cut.material" }),
       source,
@@ -139,8 +131,8 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
 
   const choice = () => ({ stock: stock.value, strategy: strategy.value, direction: direction.value, method: method.value, material: material.value });
   const state = () => ({
-    machine: machine.id,
-    tooling: [...chosen],
+    ...subject.address(),
+    tooling: subject.names(),
     stock: stock.value,
     st: strategy.value,
     fd: direction.value,
@@ -159,11 +151,30 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
     const beside = () => `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion`;
     fill(inShort, `${stock.value === "block" ? block() : beside()}, ${shown("fz", "feed")} per tooth, ${speeds}`);
   };
-  const body = () => bodyOf(machine.id, [...chosen], fields, { ...choice(), tested: form.tested.cuts });
-  return Object.assign(form, { element, state, tell, slow, body, problem: () => checked(fields, chosen, stock.value) });
+  // of what nothing was cut on nobody knows the material
+  const cutless = () => subject.material === null && !material.value && fields.ktc.input.base === null;
+  const unknown = { field: "cut.material", found: "nothing", allowed: "A material, or its coefficients" };
+  const problem = () => checked(fields, [...subject.faults(), ...(cutless() ? [unknown] : [])], stock.value);
+  const body = () => bodyOf(subject.body(), subject.names(), fields, { ...choice(), tested: form.tested.cuts });
+  return Object.assign(form, { element, state, tell, slow, body, problem });
 }
 
-function toolingPicks(toolings, chosen, onchange) {
+/** The choice of one or more toolings of the library: `element`, `names()`, `faults()`. */
+export function toolingPicks(toolings, query, onchange) {
+  const named = query.getAll("tooling").filter((name) => toolings.some((tooling) => tooling.name === name));
+  const chosen = new Set(named.length ? named.slice(0, MOST) : [newest(toolings).name]);
+  const element = h(
+    "fieldset",
+    { "data-field": "toolings" },
+    h("legend", null, "Toolings"),
+    picks(toolings, chosen, onchange),
+    h("div", { class: "fault", id: "toolings-fault", hidden: true }),
+  );
+  const faults = () => (chosen.size ? [] : [{ field: "toolings", found: "nothing", allowed: "One tooling at least" }]);
+  return { element, names: () => [...chosen], faults };
+}
+
+function picks(toolings, chosen, onchange) {
   const boxes = toolings.map((tooling) => {
     const box = h("input", {
       type: "checkbox",

@@ -41,7 +41,8 @@ export function runoutOf(query) {
   return out?.length ? out : null;
 }
 
-export function bodyOf(id, names, fields, { stock, strategy, direction, method, material, tested }) {
+/** What is asked of toolings on what they stand on, as `{machine: id}` or `{tip}`: lobes, advice where there is a feed, and FRFs. */
+export function bodyOf(on, names, fields, { stock, strategy, direction, method, material, tested }) {
   const value = (key) => fields[key].input.base;
   const beside = stock === "block" ? { stock, y_from_mm: value("ya"), y_to_mm: value("yb") } : { immersion: value("im") / 100, strategy };
   const cut = { ...beside, feed_direction: direction };
@@ -59,17 +60,19 @@ export function bodyOf(id, names, fields, { stock, strategy, direction, method, 
   if (value("runout") !== null) cut.runout_um = value("runout");
   if (material) cut.material = material;
   const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
-  const lobes = { machine: id, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
+  const lobes = { ...on, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
   const advice = value("fz") === null || method !== QUICK ? null : { ...lobes };
   if (advice && value("power") !== null) advice.max_power_kw = value("power");
   if (advice && value("torque") !== null) advice.max_torque_nm = value("torque");
   if (tested.length) lobes.tested = tested;
-  return { lobes, advice, tips: names.map((tooling) => ({ machine: id, tooling })) };
+  // a tip's cutter has no name in the library
+  const tips = (names.length ? names : [null]).map((tooling) => (tooling === null ? { ...on } : { ...on, tooling }));
+  return { lobes, advice, tips };
 }
 
 /** What can be seen to be wrong before anything is sent, in the units that are shown. */
-export function checked(fields, chosen, stock) {
-  const errors = [];
+export function checked(fields, faults, stock) {
+  const errors = [...faults];
   const sides = ["ya", "yb"];
   for (const [key, kind, usual, name, least, most] of NUMBERS) {
     const { base, value } = fields[key].input;
@@ -90,6 +93,5 @@ export function checked(fields, chosen, stock) {
   const [from, upTo] = [fields.from.input.base, fields.to.input.base];
   if (!errors.length && upTo < from)
     errors.push({ field: "speeds.to_rpm", found: text("speed", upTo), allowed: "Not below the first speed" });
-  if (!chosen.size) errors.push({ field: "toolings", found: "nothing", allowed: "One tooling at least" });
   return errors.length ? new Problem(0, { detail: "Something is not usable", errors }) : null;
 }

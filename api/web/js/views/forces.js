@@ -42,8 +42,11 @@ export async function recordingPicker(here, query, { air = false } = {}) {
   );
   const recording = h("select", null);
   async function names() {
-    if (!which.value) return;
-    const { cuts } = await get(`campaigns/${part(which.value)}`);
+    const chosen = which.value;
+    if (!chosen) return;
+    const { cuts } = await get(`campaigns/${part(chosen)}`);
+    // another one was chosen meanwhile
+    if (which.value !== chosen) return;
     const files = cuts
       .flatMap((cut) => [cut.cut.uploaded ? cut.cut.name : null, air && cut.air?.uploaded ? cut.air.name : null])
       .filter(Boolean);

@@ -22,7 +22,8 @@ export function headline(found, question) {
   const cards = found.lobes.length;
   const articles = found.lobes.map((lobes, i) => {
     const [best, ...further] = recommended(found, i);
-    const drawing = h("div", { class: "mini" }, libraryDrawing(lobes.tooling, { brief: true }));
+    // a tip's cutter is in no library
+    const drawing = question.tip?.cutter ? null : h("div", { class: "mini" }, libraryDrawing(lobes.tooling, { brief: true }));
     const key = h("span", { class: `key line ${SERIES[i % SERIES.length]}`, "aria-hidden": "true" });
     if (!best && isPreview(found, i)) {
       return h(
@@ -93,7 +94,7 @@ export function headline(found, question) {
       bandOf(found, i),
       cards === 1 ? reserve(found, question, lobes.recommended_by === null ? null : lobes.best_speeds[0]) : null,
       drawing,
-      cardLink(lobes.tooling),
+      question.tip ? null : cardLink(lobes.tooling),
     );
   });
   return h("section", { class: `bests${cards === 1 ? " one" : ""}`, "aria-label": "Recommended cuts" }, articles);

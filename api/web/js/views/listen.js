@@ -17,6 +17,7 @@ export function listenTabs(here) {
     [
       ["listen", "To a cut"],
       ["tap", "Hammer hits"],
+      ["tip", "Lobes of a tip"],
     ].map(([path, words]) => h("a", { href: to(path), class: "button", "aria-current": path === here ? "page" : null }, words)),
   );
 }

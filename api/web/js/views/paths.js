@@ -69,6 +69,8 @@ export async function view(_args, query, place) {
       if (form.surface) body.append("stock", form.surface);
       try {
         const begun = await (await send("POST", `paths/${form.kind}`, { body })).json();
+        // the job goes on for whoever has left, and is nobody's to follow here
+        if (!place.isConnected) return;
         job = begun.id;
         address();
         watch(begun);

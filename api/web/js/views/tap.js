@@ -5,11 +5,15 @@ import { add, card, fill, h, head, mark, note, save, table, waiting, whisper } f
 import { dropZone } from "../drop.js";
 import { frfFigure } from "../figures.js";
 import { busy, clearFaults, failed, field, quantity, select, showProblem } from "../forms.js";
+import { go } from "../router.js";
+import { addTapped } from "../tapped.js";
 import { factor, plain, q, quantityInput, significant } from "../units.js";
 import { listenTabs } from "./listen.js";
 
 /** Share of the hammer's band below which nothing is read off by itself. */
 const LOWEST = 0.03;
+/** Digits that are handed on: no measurement has more. */
+const DIGITS = 7;
 
 export async function view(_args, _query, place) {
   const direction = select([["X", "X"], ["Y", "Y"]], "X");
@@ -63,8 +67,8 @@ export async function view(_args, _query, place) {
   const answers = h("div", { class: "view" });
   let last = null;
 
-  /** Ask for the receptance of the files, in one of the forms that the service has. */
-  function ask(accept) {
+  /** What is asked of files, as the form has it now. */
+  function asked() {
     const found = [
       ["axis", direction.value],
       ["quantity", measures.value],
@@ -74,9 +78,14 @@ export async function view(_args, _query, place) {
       ["sensor_mass_g", mass.base ?? ""],
       ["rate_hz", rate.input.base ?? ""],
     ].filter(([, value]) => value !== "");
+    return new URLSearchParams(found);
+  }
+
+  /** Ask for the receptance of files, in one of the forms that the service has. */
+  function ask({ files, query }, accept) {
     const body = new FormData();
-    for (const file of last) body.append("hits", file);
-    return send("POST", `tap?${new URLSearchParams(found)}`, { body, headers: { Accept: accept } });
+    for (const file of files) body.append("hits", file);
+    return send("POST", `tap?${query}`, { body, headers: { Accept: accept } });
   }
 
   function refused(error) {
@@ -91,9 +100,11 @@ export async function view(_args, _query, place) {
     again.hidden = false;
     fill(answers, waiting("Looking at the hits …"));
     try {
-      const found = await (await ask("application/json")).json();
+      // what is handed on is what is shown, whatever the form says by then
+      const question = { files, query: asked() };
+      const found = await (await ask(question, "application/json")).json();
       if (last !== files) return;
-      fill(answers, shown(found, download));
+      fill(answers, shown(found, (kind, name) => download(question, kind, name), (axes) => lobes(question, axes, found)));
       whisper(`A receptance from ${found.used} of ${found.hits.length} hits`);
       answers.scrollIntoView({ block: "start" });
     } catch (error) {
@@ -103,9 +114,22 @@ export async function view(_args, _query, place) {
     }
   }
 
-  async function download(kind, name) {
+  async function download(question, kind, name) {
     try {
-      save(name, await (await ask(kind)).blob());
+      save(name, await (await ask(question, kind)).blob());
+    } catch (error) {
+      refused(error);
+    }
+  }
+
+  /** On to the lobes, with all lines that the hammer excites. */
+  async function lobes(question, axes, found) {
+    try {
+      const [names, ...lines] = (await (await ask(question, "text/csv")).text()).trim().split("\n");
+      const rows = lines.map((line) => line.split(",").map(Number)).filter(([frequency]) => frequency <= found.band_hz[1]);
+      const text = [names, ...rows.map((row) => row.map((value) => value.toPrecision(DIGITS)).join(","))].join("\n");
+      addTapped({ name: `${found.used} hits along ${axes}`, text, axes });
+      go("tip");
     } catch (error) {
       refused(error);
     }
@@ -130,7 +154,7 @@ export async function view(_args, _query, place) {
   );
 }
 
-function shown(found, download) {
+function shown(found, download, lobes) {
   const [name, curve] = Object.entries(found.axes)[0];
   const size = curve.re.map((re, k) => Math.hypot(re, curve.im[k]));
   // further down an accelerometer's noise grows with the period's square
@@ -145,10 +169,15 @@ function shown(found, download) {
     return { ...figure, say: words };
   });
   const button = (kind, file) => h("button", { type: "button", onclick: () => download(kind, file) }, file);
+  const onwards = h("button", { type: "button", class: "primary" }, "Lobes of this tip");
+  onwards.addEventListener(
+    "click",
+    busy(onwards, () => lobes(name)),
+  );
   return [
     card(
       "Receptance",
-      h("span", { class: "row-of-buttons" }, button("text/csv", "FRF.csv"), button("application/x-uff", "FRF.uff")),
+      h("span", { class: "row-of-buttons" }, button("text/csv", "FRF.csv"), button("application/x-uff", "FRF.uff"), onwards),
       h(
         "dl",
         { class: "facts" },

@@ -39,7 +39,7 @@ function questionOf(query, id, name) {
   const given = (key, usual) => (query.get(key) ? Number(query.get(key)) : usual);
   const fields = Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, { input: { base: given(key, usual) } }]));
   fields.runout = { input: { base: runoutOf(query) } };
-  return bodyOf(id, [name], fields, {
+  return bodyOf({ machine: id }, [name], fields, {
     stock: query.get("stock") ?? "",
     strategy: query.get("st") ?? "down",
     direction: query.get("fd") ?? "+X",
