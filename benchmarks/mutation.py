@@ -63,15 +63,15 @@ class Mutant(NamedTuple):
     line : int
     before, after : str
         The smallest expression around it.
-    tree : ast.Module
-        The module with the change.
+    tree : callable
+        Returns the module with the change, which few of all mutants are asked for.
     """
 
     function: str
     line: int
     before: str
     after: str
-    tree: ast.Module
+    tree: Callable[[], ast.Module]
 
 
 def main(arguments: list[str]) -> None:
@@ -208,7 +208,7 @@ def _failed(session: Any) -> bool:
 
 def _mutated(module: Any, mutant: Mutant, session: Any) -> bool:
     """Put the change in place of the function's own code, wherever that is bound by now, and run the tests."""
-    code = compile(mutant.tree, module.__file__, "exec")
+    code = compile(mutant.tree(), module.__file__, "exec")
     if mutant.function:
         owner: Any = module
         *outer, name = mutant.function.split(".")
@@ -239,12 +239,16 @@ def mutants(source: str) -> Iterator[Mutant]:
     for n, statement in enumerate(tree.body):
         for place, function in _places(statement, ""):
             for change in _changes(place):
-                twin = copy.deepcopy(statement)
-                own = next(node for node in ast.walk(twin) if _same(node, place))
-                before = ast.unparse(own)
-                change(own)
-                body = [*tree.body[:n], ast.fix_missing_locations(twin), *tree.body[n + 1 :]]
-                yield Mutant(function, place.lineno, before, ast.unparse(own), ast.Module(body, []))
+                changed = copy.deepcopy(place)
+                change(changed)
+                yield Mutant(function, place.lineno, ast.unparse(place), ast.unparse(changed), partial(_with, tree, n, place, change))
+
+
+def _with(tree: ast.Module, n: int, place: ast.AST, change: Callable[[Any], None]) -> ast.Module:
+    """Return a module with one place of its n-th statement changed."""
+    twin = copy.deepcopy(tree.body[n])
+    change(next(node for node in ast.walk(twin) if _same(node, place)))
+    return ast.Module([*tree.body[:n], ast.fix_missing_locations(twin), *tree.body[n + 1 :]], [])
 
 
 def _same(node: ast.AST, place: ast.AST) -> bool:
