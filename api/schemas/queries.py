@@ -62,6 +62,10 @@ class TipQuery(Body):
 
     def request(self, work_seconds: float) -> TipRequest:
         """Return the query in SI."""
+        untold = [] if self.tip is None else sorted(self.model_fields_set & {"from_hz", "to_hz", "step_hz", "spindle_speed_rpm"})
+        if untold:
+            allowed = "nothing beside a tip: it answers where it was measured, and tip.from_hz leaves lines out"
+            raise InputError(untold[0], getattr(self, untold[0]), allowed)
         speed = None if self.spindle_speed_rpm is None else from_rpm(self.spindle_speed_rpm)
         spread = self.stiffness_spread_percent / 100.0
         return TipRequest(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, spread, work_seconds)

@@ -15,7 +15,7 @@ from api.jobs.codec import decode
 from api.jobs.worker import carry
 from api.schemas.jobs import PartialLobes
 from api.schemas.robots import EXAMPLE as ROBOT
-from api.stores.jobs import PARTIAL
+from api.stores.jobs import PARTIAL, Job
 from tests.api.identifying import Steps, carried
 from tests.api.in_process import refused, service
 from tests.fixtures.service import example
@@ -209,3 +209,9 @@ def test_who_waits_is_told_its_place_and_for_how_long(shop, store):
     ended = client.lobe_job(second).job
     assert ended.queue is None
     assert ended.waited_s >= waiting.waited_s
+
+
+def test_a_question_of_an_earlier_release_names_its_robot():
+    """Jobs wait through an upgrade: their words have the keys of the release that took them."""
+    job = Job("j", "A", "lobes", "", None, json.dumps({"machine": None, "robot": {"robot": "tx200"}}), "queued", "2026-01-01T00:00:00Z")
+    assert lobes._called(job) == "tx200"

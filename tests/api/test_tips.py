@@ -111,6 +111,8 @@ def test_its_frf_is_as_it_was_measured(client: Client, tip, tmp_path):
     for test in read_frfs(tmp_path / "FRF.csv"):
         np.testing.assert_allclose(test.values, ALONG[test.force][50:], rtol=1e-7)
     assert refused(422, client.tooltip, tip).errors[0].field == "tooling"
+    for name, value in (("from_hz", 200.0), ("to_hz", 3000.0), ("step_hz", 1.0), ("spindle_speed_rpm", 6000.0)):
+        assert refused(422, client.tooltip, asked, **{name: value}).errors[0].field == name
 
 
 def test_as_a_job_they_are_the_same(client: Client, store: Store, tip, tmp_path):

@@ -11,7 +11,7 @@ import { listenTabs } from "./listen.js";
 import { lobesBench } from "./lobes_bench.js";
 
 const WANTED = "The lobes appear here once cutter and material are told.";
-const DIRECTIONS = [["", "as the file says"], ...["X", "Y", "XY", "YX"].map((axes) => [axes, axes])];
+const DIRECTIONS = [["", "as the file says"], ...["X", "Y", "Z", "XY", "YX"].map((axes) => [axes, axes])];
 const UNITS = [["", "as the files say"], ...["m/N", "um/N", "mm/N", "in/lbf", "(m/s^2)/N", "g/N", "(m/s)/N"].map((unit) => [unit, unit.replace("um", "µm")])];
 /** A cutter's own fields: key in the address, kind, key of a tooling file, label. */
 const CUTTER = [
@@ -134,7 +134,14 @@ function cutterPicks(toolings, query) {
     (which.value ? [] : CUTTER.slice(0, 2))
       .filter(([key]) => value(key) === null)
       .map(([, , name]) => ({ field: `cutter.${name}`, found: "nothing", allowed: "A number is needed here" }));
-  const address = () => ({ ...Object.fromEntries(CUTTER.map(([key]) => [key, which.value ? null : value(key)])), low: lowest.input.base, units: units.value });
-  const summaries = () => [...toolings, { name: "tip", shape: "flat", stickout_mm: null, ...cutter() }];
-  return { element, body, address, faults, summaries, names: () => (which.value ? [which.value] : []), material: null, shaped: toolings.some((each) => each.shape !== "flat") };
+  const address = () => ({
+    ...Object.fromEntries(CUTTER.map(([key]) => [key, which.value ? null : value(key)])),
+    low: lowest.input.base,
+    units: units.value,
+  });
+  const names = () => (which.value ? [which.value] : []);
+  // as the service calls a cutter that has no name
+  const summaries = () => (which.value ? toolings : [{ name: "tip", shape: "flat", stickout_mm: null, ...cutter() }]);
+  const shaped = toolings.some((each) => each.shape !== "flat");
+  return { element, body, address, faults, summaries, names, material: null, shaped };
 }
