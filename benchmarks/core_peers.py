@@ -38,7 +38,8 @@ from rcsa_ident.io.uff import UffAxis, UffFunction, read_uff, write_uff
 from rcsa_ident.signals.spectra import line_spectrum
 from rcsa_ident.stability.adaptive_importance import adaptive_importance
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
-from rcsa_ident.tool_holder.model import tool_holder_poles, tool_holder_receptance, tool_holder_structure
+from rcsa_ident.tool_holder.model import free_body, tool_holder_poles, tool_holder_receptance, tool_holder_structure
+from rcsa_ident.tool_holder.turning import turning_pair
 from tests.fixtures.virtual_shop import open_shop
 from tests.identification.models import machine_vector, remade
 from tests.oracles import ross_table
@@ -51,7 +52,8 @@ def run() -> list[dict[str, Any]]:
 
 def races() -> list[Race]:
     """Those whose peer is installed."""
-    found = [dense_holder(), coupled_tip(), lines_of_a_record(), polish(), vector_fit(), complex_frequency(), draws(), universal_file()]
+    found = [dense_holder(), turning_holder(), coupled_tip()]
+    found += [lines_of_a_record(), polish(), vector_fit(), complex_frequency(), draws(), universal_file()]
     return [ross_shaft(), *found] if importlib.util.find_spec("ross") else found
 
 
@@ -100,6 +102,30 @@ def dense_holder() -> Race:
     ours = partial(fresh, assembly, omega)
     told = f"same mesh, {apart(ours().values, theirs())} apart"
     return Race("tool-holder: drawing to 300 receptances", "SciPy, dense solution at each frequency", "scipy", ours, theirs, told)
+
+
+def turning_holder() -> Race:
+    """The same tool turning, both planes, at 352 tooth-passing lines of 44 speeds: what an identification asks for."""
+    assembly = read_tooling(TOOLING).assembly
+    teeth = np.repeat(4.0 * np.arange(1, 9), 44)
+    omega = 2.0 * np.pi * np.linspace(300.0, 4300.0, teeth.size)
+
+    def theirs() -> list[np.ndarray]:
+        body = free_body(assembly, 4300.0)
+        one, ports = body.structure, np.eye(len(body.rotary))[:, body.structure.index]
+        stiff, found = one.stiffness + 1j * one.structural_damping, []
+        for sense in (1.0, -1.0):
+            mass = (one.mass + sense * 2.0 * body.rotary / n for n in teeth)
+            both = zip(omega, mass, strict=True)
+            solved = (scipy.linalg.solve(stiff + 1j * w * one.damping - w**2 * m, ports, assume_a="sym") for w, m in both)
+            found.append(np.array([each[one.index] for each in solved]))
+        return found
+
+    def ours() -> tuple[np.ndarray, np.ndarray]:
+        return turning_pair(assembly, omega, 1.0 / teeth)
+
+    told = f"same mesh, {apart(np.array(ours()), np.array(theirs()))} apart"
+    return Race("turning tool-holder: drawing to 352 lines, both planes", "SciPy, dense solution at each line", "scipy", ours, theirs, told)
 
 
 def coupled_tip() -> Race:

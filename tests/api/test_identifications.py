@@ -32,7 +32,7 @@ from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying
 from tests.api.identifying import Steps, carried, declared, uploaded
 from tests.api.in_process import URL, embedded, refused, service
-from tests.fixtures.waiting import until
+from tests.fixtures.waiting import PATIENCE, until
 
 KINDS = {"progress", "trace", "fit", "end"}
 
@@ -315,11 +315,8 @@ def test_cancelled_while_it_runs(client, store, tmp_path):
         if kind == "trace":
             break
     assert client.cancel(id).state == "cancelled"
-    start = time.monotonic()
-    thread.join(30.0)
+    thread.join(PATIENCE)
     assert not thread.is_alive()
-    # far less than the search takes
-    assert time.monotonic() - start < 30.0
     assert client.job(id).state == "cancelled"
     refused(409, client.result, id)
     assert client.machine(machine).identification is None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import time
 
 import numpy as np
 import pytest
@@ -113,11 +112,9 @@ def test_the_service_ends_with_its_streams(served):
     with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:
         assert next(iter(stream.received())).name == "opened"
         streams = processes(process.pid)["streams"].pid
-        start = time.monotonic()
         process.send_signal(signal.SIGTERM)
         with pytest.raises(StreamRefused) as caught:
             list(stream.received())
         assert caught.value.code in (1001, 1012)
     assert process.wait(PATIENCE) is not None
-    assert time.monotonic() - start < 60.0
     until(lambda: ended(streams))
