@@ -54,6 +54,7 @@ STUDIES = (
     "dynamometer",
     "real_machine",
     "hammer",
+    "measured_tips",
     "rough",
     "rough_recommendation",
     "validation",

@@ -16,6 +16,8 @@ from rcsa_ident.errors import InputError
 
 #: Share of the largest part below which a residue's further rank-one parts are dropped.
 _RANK = 1e-6
+#: So many orders in succession without a gain end the search for further poles above the noise.
+_IDLE = 2
 #: Times the band's end beyond which a pole is no more than a part of the constant, which it would nearly cancel.
 _FAR = 20.0
 
@@ -112,7 +114,8 @@ def rational_fit(
     values : complex array, shape (n,), (n, r) or (n, r, c)
         All entries share the poles.
     order : int, optional
-        Number of poles. By default the smallest with which the weighted rms misfit is within the tolerance, or within the noise.
+        Number of poles. By default the smallest with which the weighted rms misfit is within the tolerance; or within the noise, and
+        then as many more as gain by Bayes's information criterion: one mode among many lines of noise hardly changes the rms.
     tolerance : float
         Relative rms misfit that is looked for where no noise is given.
     noise : array of the values' shape (or broadcast to it), optional
@@ -144,15 +147,25 @@ def rational_fit(
         best = min((c for c in candidates if c.order == order), key=lambda c: c.rms)
         return _finished(problem, best.pole)
     found: list[Candidate] = []
-    for candidate in growing(problem.thinned(min(highest_order, problem.highest)), min(highest_order, problem.highest)):
+    good, idle = None, 0
+    thinned = problem.thinned(min(highest_order, problem.highest))
+    for candidate in growing(thinned, min(highest_order, problem.highest)):
         found.append(candidate)
-        if candidate.rms <= problem.target(candidate.order):
+        if good is not None:
+            share = candidate.independent
+            gains = thinned.criterion(candidate, share) < thinned.criterion(good, share)
+            good, idle = (candidate, 0) if gains else (good, idle + 1)
+            if idle == _IDLE:
+                break
+        elif candidate.rms <= problem.target(candidate.order):
             fit = _finished(problem, candidate.pole)
             if fit.status is FitStatus.CONVERGED:
-                return fit
+                if noise is None:
+                    return fit
+                good = candidate
     if not found:
         raise InputError("frequencies", problem.omega.size, "enough for two poles")
-    return _finished(problem, min(found, key=problem.criterion).pole)
+    return _finished(problem, (min(found, key=problem.criterion) if good is None else good).pole)
 
 
 def fitted_poles(

@@ -16,15 +16,19 @@ FLOOR = 0.02
 _THINNED = 25
 #: Relocations of the poles at most.
 _RELOCATIONS = 30
+#: Correlation of neighbouring lines' misfits at most: of a few points at least each is taken to tell something of its own.
+_ALIKE = 0.9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """Poles and how well they do: weighted rms misfit and the misfit over frequency."""
+    """Poles and how well they do: weighted rms misfit, the misfit over frequency, and how much each line's tells that its neighbour's
+    does not, as a share."""
 
     pole: ComplexArray
     rms: float
     misfit: FloatArray
+    independent: float
 
     @property
     def order(self) -> int:
@@ -134,9 +138,9 @@ class Problem:
         """Return the same in the unit of `RationalFit.error`."""
         return 1.0001 * self.target(order) * self.tolerance
 
-    def criterion(self, candidate: Candidate) -> float:
-        """Return Bayes's information criterion: less is better."""
-        points = 2 * self.values.size
+    def criterion(self, candidate: Candidate, independent: float = 1.0) -> float:
+        """Return Bayes's information criterion, less is better, where so large a share of the points tells something of its own."""
+        points = 2 * self.values.size * independent
         return points * float(np.log(candidate.rms**2)) + self.unknowns(candidate.order) * float(np.log(points))
 
     def relocated(self, pole: ComplexArray) -> tuple[ComplexArray, float]:
@@ -199,8 +203,11 @@ class Problem:
             if idle > 2:
                 break
             pole = moved
-        misfit = np.sum(np.abs(self.residues(best)[1]) ** 2, axis=1)
-        return Candidate(best, float(np.sqrt(np.sum(misfit) / self.values.size)), misfit)
+        left = self.residues(best)[1]
+        misfit = np.sum(np.abs(left) ** 2, axis=1)
+        # of white noise neighbours tell nothing of each other; what a window smears, or poles leave, they share
+        alike = float(np.clip(np.vdot(left[1:], left[:-1]).real / max(np.sum(misfit), 1e-300), 0.0, _ALIKE))
+        return Candidate(best, float(np.sqrt(np.sum(misfit) / self.values.size)), misfit, (1.0 - alike) / (1.0 + alike))
 
 
 def growing(problem: Problem, highest: int) -> Iterator[Candidate]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.line_noise import line_noise
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.poles import PoleResidue, frequencies
 from rcsa_ident.dynamics.rational import fitted_poles
@@ -32,6 +33,9 @@ FIT_TOLERANCE = 2e-3
 NEAR_ENOUGH = 5e-3
 #: Damping ratio of a fitted pole outside the band, at least: lightly damped, it would chatter.
 DAMPED_OUTSIDE = 0.1
+#: The same where it was measured, and the share of the largest value below which smaller ones matter no more; noise counts from that
+#: share of the tolerance on.
+MEASURED, _SEEN = 1e-2, 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -196,14 +200,26 @@ class ModeArrays(NamedTuple):
 def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
     """Return modes that stand for the tip's receptance, and how far they are beside it: the norm of what is left, as a share.
 
-    Poles that the receptance knows without a fit are taken where they are near enough, else a rational function is fitted.
+    Poles that the receptance knows without a fit are taken where they are near enough, else a rational function is fitted; to one that
+    was measured as far as its noise goes.
     """
     known = known_modes(tip)
     if known is not None:
         return known
     size = slope_length(tip.values)
-    found, error = fitted_poles(tip.omega, tip.values * np.outer(size, size), FIT_TOLERANCE, DAMPED_OUTSIDE)
+    values = tip.values * np.outer(size, size)
+    found, error = fitted_poles(tip.omega, values, FIT_TOLERANCE, DAMPED_OUTSIDE, _allowed(values))
     return TipModes.joined([found.projected(np.diag(1.0 / size), np.diag(1.0 / size))]), error
+
+
+def _allowed(values: ComplexArray) -> FloatArray | None:
+    """What a fit may be beside lines that show noise: the standard deviation of their parts, and of the tolerance; None where they show
+    less than the fit may be beside them anyway."""
+    noise = line_noise(values)
+    size = np.abs(values)
+    largest = size.max(axis=0)
+    tolerance = np.sqrt(0.5) * np.maximum(size, MEASURED * np.where(largest == 0.0, largest.max(), largest))
+    return np.hypot(noise, MEASURED * tolerance) if np.any(noise > _SEEN * FIT_TOLERANCE * tolerance) else None
 
 
 def slope_length(values: ComplexArray) -> FloatArray:

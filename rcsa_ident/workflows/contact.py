@@ -12,6 +12,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.line_noise import differences_noise
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
@@ -209,16 +210,10 @@ def _scaled(segments: tuple[BeamSegment, ...], factor: float) -> tuple[BeamSegme
 
 
 def neighbour_noise(values: ComplexArray) -> FloatArray:
-    """Return the standard deviation of each part from third differences over frequency, shape (n,).
-
-    The median of a window, so that a resonance does not count as noise.
-    """
+    """Return the standard deviation of each part from differences over frequency, shape (n,); of a few values a share of their size."""
     if values.size < 8:
         return np.full(values.size, 0.01 * float(np.median(np.abs(values))))
-    # a third difference of white noise has 20 times its variance, and a median of |z|^2 is ln 2 of the mean
-    power = np.abs(np.diff(values, 3)) ** 2 / 20.0 / np.log(2.0)
-    places = np.clip(np.arange(values.size)[:, None] + np.arange(-20, 20), 0, power.size - 1)
-    return np.sqrt(0.5 * np.median(power[places], axis=1)) + 1e-6 * np.abs(values)
+    return differences_noise(values) + 1e-6 * np.abs(values)
 
 
 class _Problem:

@@ -48,6 +48,22 @@ def test_the_order_comes_out_of_the_data():
     np.testing.assert_array_equal(fit.constant, 0.0)
 
 
+def test_a_small_mode_is_found_among_many_lines_of_noise():
+    """It hardly changes the rms: without it the misfit is 1.02 of the noise."""
+    omega, rng = 2.0 * np.pi * np.arange(100.0, 4301.0), np.random.default_rng(1)
+    values = modal().receptance(omega).values[:, 0, 0]
+    small = normal_modes(2.0 * np.pi * np.array([2200.0]), np.array([0.005]), np.array([[0.1]]), TIP[:1]).receptance(omega).values[:, 0, 0]
+    level = 0.3 * np.abs(small).max()
+    noise = level * (rng.standard_normal(omega.size) + 1j * rng.standard_normal(omega.size))
+    assert np.sqrt(1.0 + np.mean(np.abs(small) ** 2) / (2.0 * level**2)) < 1.023
+    without, fit = (rational_fit(omega, each + noise, noise=level) for each in (values, values + small))
+    assert without.order < fit.order <= 12
+    assert fit.status is FitStatus.CONVERGED
+    nearest = fit.pole[np.argmin(np.abs(np.abs(fit.pole) - 2.0 * np.pi * 2200.0))]
+    assert abs(nearest) == pytest.approx(2.0 * np.pi * 2200.0, rel=1e-3)
+    assert -nearest.real / abs(nearest) == pytest.approx(0.005, rel=0.3)
+
+
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 5), st.integers(0, 2**31), st.integers(0, 2))
