@@ -12,7 +12,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.line_noise import differences_noise
+from rcsa_ident.dynamics.line_noise import differences_noise, line_noise
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
@@ -213,7 +213,7 @@ def neighbour_noise(values: ComplexArray) -> FloatArray:
     """Return the standard deviation of each part from differences over frequency, shape (n,); of a few values a share of their size."""
     if values.size < 8:
         return np.full(values.size, 0.01 * float(np.median(np.abs(values))))
-    return differences_noise(values) + 1e-6 * np.abs(values)
+    return np.maximum(differences_noise(values), line_noise(values)) + 1e-6 * np.abs(values)
 
 
 class _Problem:
