@@ -28,14 +28,14 @@ DIRECTIONS = tuple(Coordinate("tip", dof) for dof in (Dof.X, Dof.Y, Dof.Z, Dof.S
 TIP = DIRECTIONS[:2]
 #: What a fit of a receptance may be beside it, root mean square.
 FIT_TOLERANCE = 2e-3
+#: The same beside noise where a receptance was measured, as nearly as anybody measures one; a share of the largest value below which
+#: smaller ones matter no more; and the share of the tolerance from which on lines are called noisy.
+_MEASURED, _SMALL, _NOISY = 1e-2, 1e-2, 0.1
 #: How far poles that are known without a fit may be beside the receptance: materials lose a constant share, modes one that grows with
 #: frequency, which between resonances is a few thousandths.
 NEAR_ENOUGH = 5e-3
 #: Damping ratio of a fitted pole outside the band, at least: lightly damped, it would chatter.
 DAMPED_OUTSIDE = 0.1
-#: The same where it was measured, and the share of the largest value below which smaller ones matter no more; noise counts from that
-#: share of the tolerance on.
-MEASURED, _SEEN = 1e-2, 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -218,8 +218,8 @@ def _allowed(values: ComplexArray) -> FloatArray | None:
     noise = line_noise(values)
     size = np.abs(values)
     largest = size.max(axis=0)
-    tolerance = np.sqrt(0.5) * np.maximum(size, MEASURED * np.where(largest == 0.0, largest.max(), largest))
-    return np.hypot(noise, MEASURED * tolerance) if np.any(noise > _SEEN * FIT_TOLERANCE * tolerance) else None
+    part = np.sqrt(0.5) * np.maximum(size, _SMALL * np.where(largest == 0.0, largest.max(), largest))
+    return np.hypot(noise, _MEASURED * part) if np.any(noise > _NOISY * FIT_TOLERANCE * part) else None
 
 
 def slope_length(values: ComplexArray) -> FloatArray:
