@@ -113,8 +113,8 @@ def _limits(
         modes, error = fitted_modes(both) if known is None else known
         found = method.lobes(modes, process, speeds, max_depth)
         share = f"{100.0 * error:.2g}" if error > 1e-4 else "less than 0.01"
-        what = "a fit with" if known is None else "the assembly's own"
-        told = f"the receptance was replaced by {what} {modes.pole.size} modes (relative error {share} %)"
+        what, noise = ("a fit with", ", noise included") if known is None else ("the assembly's own", "")
+        told = f"the receptance was replaced by {what} {modes.pole.size} modes (relative error {share} %{noise})"
         found = replace(found, warnings=(*found.warnings, told))
     axial = "" if plain else _axial(both, process, found)
     found = replace(found, warnings=(*found.warnings, *([axial] if axial else []), *process.remarks))

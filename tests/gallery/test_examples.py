@@ -20,7 +20,7 @@ REAL = [name for name, path in EXAMPLES.items() if path.parent.name == "real_fil
 #: About how many seconds those take that are not done at once.
 SLOW = {
     "holder_to_tip": 15, "labelled_cuts": 14, "force_monitoring": 10, "never_cut_tool": 8, "du2023": 8, "any_cutter": 5, "hurco": 3,
-    "huynh2018": 3, "ring_a_tool": 3, "path_margins": 3, "all_methods": 2, "tap_tests": 2,
+    "huynh2018": 3, "ring_a_tool": 3, "path_margins": 3, "slow_spindle": 8, "noise_is_no_mode": 2, "all_methods": 2, "tap_tests": 2,
 }  # fmt: skip
 #: Lines, text included.
 LONGEST = 90
