@@ -49,6 +49,14 @@ def test_noise_is_not_taken_for_modes(kind):
     np.testing.assert_allclose(limits(modes), true, rtol=0.01)
 
 
+@pytest.mark.parametrize("step", [5, 10])
+def test_noise_between_few_lines(step):
+    """A resonance of some 20 Hz has two to four of them."""
+    modes, _ = fitted_modes(Receptance(OMEGA[::step], measured("much").values[::step], TIP, TIP))
+    assert modes.pole.size <= 5
+    np.testing.assert_allclose(limits(modes), limits(tip(SKEWED)), rtol=0.01)
+
+
 @pytest.mark.parametrize("step", [1, 5, 20])
 def test_a_tip_without_noise_is_fitted_as_near_as_ever(step):
     lines = slice(None, None, step)
