@@ -105,7 +105,7 @@ def dense_holder() -> Race:
 
 
 def turning_holder() -> Race:
-    """The same tool turning, both planes, at 352 tooth-passing lines of 44 speeds: what an identification asks for."""
+    """The same tool turning, both planes, at 352 tooth-passing lines, each at a speed of its own: what an identification asks for."""
     assembly = read_tooling(TOOLING).assembly
     teeth = np.repeat(4.0 * np.arange(1, 9), 44)
     omega = 2.0 * np.pi * np.linspace(300.0, 4300.0, teeth.size)

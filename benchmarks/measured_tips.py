@@ -22,8 +22,9 @@ from benchmarks.machines import named, random_machine
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.machines import MachineFile, read_machine
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability import tip_modes
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
@@ -33,6 +34,8 @@ from rcsa_ident.units import from_hz, from_rpm
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 OMEGA, SPEEDS, DEEPEST = from_hz(np.arange(100.0, 5001.0)), from_rpm(np.linspace(4000.0, 14_000.0, 9)), 30e-3
+#: Modes of a stiff tip: frequency [Hz], damping ratio, stiffness [N/m].
+STIFF = ((900.0, 0.03, 2e8), (2300.0, 0.03, 3e8), (4800.0, 0.02, 3e8), (9000.0, 0.02, 4e8))
 #: Of one hit at the tip of a real tool: frequency [Hz], real and imaginary part [m/N].
 HIT = Path(__file__).resolve().parents[2] / "shared" / "data" / "hammer" / "frf_tip_from_point_1.txt"
 
@@ -77,14 +80,20 @@ def untold(tip: Receptance, process: MillingProcess) -> tuple[FloatArray, int, f
         return limits(tip, process)
 
 
-def compared(seed: str) -> dict[str, list[tuple[FloatArray, int, float]]]:
-    """Return relative errors of the limits, modes and time of both fits, for each kind of noise."""
+def drawn(seed: str) -> tuple[MachineFile, Tooling, MillingProcess]:
+    """Return a machine, its first tooling and what that cuts."""
     with tempfile.TemporaryDirectory() as folder:
         machine = read_machine(random_machine(int(seed), Path(folder)))
         tooling = read_tooling(machine.toolings[0])
+    engagement = machine.plan.conditions(float(SPEEDS[0])).engagement
+    return machine, tooling, MillingProcess(tooling.cutter, machine.workpiece.coefficients, engagement)
+
+
+def compared(seed: str) -> dict[str, list[tuple[FloatArray, int, float]]]:
+    """Return relative errors of the limits, modes and time of both fits, for each kind of noise."""
+    machine, tooling, process = drawn(seed)
     names = tuple(str(each) for each in TIP)
     exact = frequency_response(rotor(machine.spindle, tooling.assembly), OMEGA, 0.0, names, names)
-    process = MillingProcess(tooling.cutter, machine.workpiece.coefficients, machine.plan.conditions(float(SPEEDS[0])).engagement)
     true = stability_lobes(Receptance(OMEGA, exact, TIP, TIP), process, SPEEDS, DEEPEST, MultiFrequency()).limit_depth
     found: dict[str, list[tuple[FloatArray, int, float]]] = {}
     for name, (kind, level) in NOISES.items():
@@ -103,12 +112,22 @@ def halves(path: Path, way: Callable[[Receptance, MillingProcess], tuple[FloatAr
     hertz, real, imaginary = np.loadtxt(path, skiprows=1, unpack=True)[:3, 120:]
     values = np.zeros((hertz.size, 2, 2), dtype=complex)
     values[:, 0, 0] = values[:, 1, 1] = real + 1j * imaginary
-    with tempfile.TemporaryDirectory() as folder:
-        machine = read_machine(random_machine(1, Path(folder)))
-        tooling = read_tooling(machine.toolings[0])
-    process = MillingProcess(tooling.cutter, machine.workpiece.coefficients, machine.plan.conditions(float(SPEEDS[0])).engagement)
+    _, _, process = drawn("1")
     even, odd = (way(Receptance(from_hz(hertz[k::2]), values[k::2], TIP, TIP), process)[0] for k in (0, 1))
     return np.abs(np.minimum(even, DEEPEST) / np.minimum(odd, DEEPEST) - 1.0)
+
+
+def stiff(way: Callable[[Receptance, MillingProcess], tuple[FloatArray, int, float]]) -> float:
+    """Return the processor time of a stiff tip in 15 000 lines with 0.1 % of noise [s]."""
+    omega, rng = from_hz(np.arange(100.0, 15_001.0)), np.random.default_rng(1)
+    values = np.zeros((omega.size, 2, 2), dtype=complex)
+    for axis in range(2):
+        own = values[:, axis, axis]
+        for hertz, zeta, stiffness in STIFF:
+            natural = from_hz(hertz * (1.0 + 0.05 * axis))
+            own += natural**2 / stiffness / (natural**2 - omega**2 + 2j * zeta * natural * omega)
+        own += 1e-3 * np.abs(own).max() * (rng.standard_normal(omega.size) + 1j * rng.standard_normal(omega.size))
+    return way(Receptance(omega, values, TIP, TIP), drawn("1")[2])[2]
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -127,6 +146,7 @@ def main(arguments: Sequence[str]) -> None:
             told.append(f"{np.median(error):.4f}, {error.max():.4f} | {min(modes)} to {max(modes)}")
         ratio = sum(row[2] for row in theirs) / sum(row[2] for row in ours)
         print(f"| {name} | {' | '.join(told)} | {ratio:.1f} |")
+    print(f"a stiff tip up to 15 kHz: {stiff(untold) / stiff(limits):.1f} times ours where the fit is not told")
     if HIT.exists():
         for name, way in (("told", limits), ("not told", untold)):
             apart = halves(HIT, way)

@@ -52,7 +52,7 @@ def line_noise(values: ComplexArray) -> FloatArray:
     >>> omega, rng = np.linspace(1.0, 2.0, 2000), np.random.default_rng(1)
     >>> mode = 1.0 / (1.5**2 - omega**2 + 0.06j * omega)
     >>> noise = 0.1 * (rng.standard_normal(2000) + 1j * rng.standard_normal(2000))
-    >>> float(np.median(line_noise(mode + noise))).__round__(2)
+    >>> round(float(np.median(line_noise(mode + noise))), 2)
     0.11
     >>> float(line_noise(mode).max())
     0.0

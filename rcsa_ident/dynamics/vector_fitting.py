@@ -139,7 +139,7 @@ class Problem:
         return 1.0001 * self.target(order) * self.tolerance
 
     def criterion(self, candidate: Candidate, independent: float = 1.0) -> float:
-        """Return Bayes's information criterion, less is better, where so large a share of the points tells something of its own."""
+        """Return Bayes's information criterion [schwarz1978], less is better, where so large a share of the points tells something new."""
         points = 2 * self.values.size * independent
         return points * float(np.log(candidate.rms**2)) + self.unknowns(candidate.order) * float(np.log(points))
 
@@ -205,7 +205,8 @@ class Problem:
             pole = moved
         left = self.residues(best)[1]
         misfit = np.sum(np.abs(left) ** 2, axis=1)
-        # of white noise neighbours tell nothing of each other; what a window smears, or poles leave, they share
+        # of white noise neighbours tell nothing of each other; what a window smears, or poles leave, they share: of points whose
+        # correlation falls with the distance so many are worth as much as independent ones [bayley1946]
         alike = float(np.clip(np.vdot(left[1:], left[:-1]).real / max(np.sum(misfit), 1e-300), 0.0, _ALIKE))
         return Candidate(best, float(np.sqrt(np.sum(misfit) / self.values.size)), misfit, (1.0 - alike) / (1.0 + alike))
 
