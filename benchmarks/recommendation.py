@@ -35,7 +35,8 @@ from rcsa_ident.units import from_rpm, to_rpm
 from rcsa_ident.virtual.limit import multiplier, true_limit
 from rcsa_ident.virtual.reduction import Poles, poles, reduced
 from rcsa_ident.virtual.rotor import rotor
-from rcsa_ident.workflows.tool_change import ToolChange, advise
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import ToolChange
 
 #: Machines have four toolings each; their seeds begin here, far from those of the study.
 CASES, FIRST_SEED = 200, 9001

@@ -29,7 +29,8 @@ from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
-from rcsa_ident.workflows.tool_change import ToolChange, advise
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import ToolChange
 
 #: Cuts of each tooling, and the draws of machines behind the interval.
 CUTS, AGAIN = 5, 2000

@@ -114,7 +114,7 @@ def limits(machine: IdentifiedMachine, setup: MachineFile, tooling: Tooling, spe
     """Return the limits that users are told, shape (n,), and the ends of their 95 % band, shape (2, n) [m]."""
     plan, known = setup.plan, setup.workpiece.coefficients
     cut = CutSpec(plan.engagement, plan.feed_angle, coefficients={"tangential": known.tangential, "radial_ratio": known.radial_ratio})
-    found = ToolChange(machine, tooling, cut, speeds, DEEPEST, FullDiscretisation()).fitting_limits(speeds)
+    found = ToolChange(machine, tooling, cut, speeds, DEEPEST, FullDiscretisation()).fitting_limits(speeds).lobes
     band = np.full((2, speeds.size), np.nan) if found.band is None else np.array(found.band)
     return found.limit_depth, band
 

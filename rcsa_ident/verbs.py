@@ -268,7 +268,7 @@ def advise(
     max_depth : float [m]
         Limits beyond it are not of interest.
     method : StabilityMethod, default ZeroOrder()
-        Of the lobes; where they are zero-order ones, recommended cuts are computed anew by full discretisation.
+        Of the lobes; recommended cuts are computed by full discretisation, whatever it is.
     drive : SpindleDrive, optional
         Power, torque and highest speed of the spindle.
     depth : float [m], optional
@@ -286,14 +286,15 @@ def advise(
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.identified import Result
     from rcsa_ident.stability.zero_order import ZeroOrder
-    from rcsa_ident.workflows import tool_change
+    from rcsa_ident.workflows.advise import advise as ask
+    from rcsa_ident.workflows.tool_change import ToolChange
 
     source = machine.machine if isinstance(machine, Result) else machine
     chosen = ZeroOrder() if method is None else method
     over = rpm(4000.0, 20_000.0, 50.0) if speeds is None else speeds
-    change = tool_change.ToolChange(source, tooling, CutSpec() if cut is None else cut, over, max_depth, chosen)
+    change = ToolChange(source, tooling, CutSpec() if cut is None else cut, over, max_depth, chosen)
     with _one_thread():
-        return tool_change.advise(change, SpindleDrive.flat() if drive is None else drive, depth=depth, planned=planned)
+        return ask(change, SpindleDrive.flat() if drive is None else drive, depth=depth, planned=planned)
 
 
 def estimate_forces(

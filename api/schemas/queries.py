@@ -256,12 +256,41 @@ class BestSpeed(Answer):
     )
 
 
+class HeldBack(Answer):
+    """How a recommended depth follows from the stability limit; a depth is null where no limit was found up to the one asked for."""
+
+    within_tolerance_mm: float | None = Field(description="The lowest limit within the tolerance of the speed.")
+    with_probability_mm: float | None = Field(description="Stable there with the probability; null, too, where no machines were drawn.")
+    less_reserve_mm: float | None
+    tolerance_percent: float
+    probability_percent: float
+    reserve_percent: float
+    in_words: str
+
+
 class RecommendedCut(Answer):
-    """A cut that is recommended: its depth is the stability limit less tolerance of the speed, probability and reserve."""
+    """A recommended cut with what it takes from the spindle: the limit less tolerance of the speed, probability and reserve."""
 
     spindle_speed_rpm: float
-    recommended_depth_mm: float | None = Field(description="null: nothing limits the cut up to the depth that was asked for.")
+    recommended_depth_mm: float | None = Field(description="null: nothing limits the cut up to the depth that was asked for, or `why`.")
     limit_depth_mm: float | None = Field(description="Stability limit there; null: none up to the depth that was asked for.")
+    axial_depth_mm: float | None = Field(description="As recommended_depth_mm.")
+    removal_rate_cm3_per_min: float | None = Field(description="null without a feed or a recommended depth, as are power and torque.")
+    power_kw: float | None
+    torque_nm: float | None
+    bound: str = Field(description="What stands against more depth: chatter, power, torque, speed, depth, edge or frequency.")
+    why: str | None = Field(None, description="Why no depth is recommended; null where one is.")
+    held_back: HeldBack | None = Field(None, description="null where not chatter limits the depth.")
+
+
+class Limits(Answer):
+    """Limits around a recommended cut, by the method that computed it; null: stable up to the depth that was asked for."""
+
+    spindle_speed_rpm: list[float]
+    limit_depth_mm: list[float | None]
+    limit_depth_low_mm: list[float | None] | None
+    limit_depth_high_mm: list[float | None] | None
+    chatter_frequency_hz: list[float | None]
 
 
 class TestedTally(Answer):
@@ -299,10 +328,11 @@ class ToolingLobes(Answer):
     spindle_speed_rpm: list[float]
     limit_depth_mm: list[float | None]
     limit_depth_low_mm: list[float | None] | None = Field(
-        description="95 % of the possible machines and cutting coefficients lie above it."
+        description="95 % of the possible machines and cutting coefficients lie between; null without them, and in a preview."
     )
     limit_depth_high_mm: list[float | None] | None
-    recommended_depth_mm: list[float | None]
+    around: list[Limits] = Field([], description="Limits around the recommended cuts; there they replace a preview.")
+    recommended_depth_mm: list[float | None] = Field(description="null: none is recommended, as in a preview.")
     chatter_frequency_hz: list[float | None]
     lobe: list[int | None]
     flip: list[bool]
@@ -372,16 +402,6 @@ class AdviceQuery(Milled):
         )
 
 
-class OperatingPoint(RecommendedCut):
-    """A recommended cut with what it takes from the spindle."""
-
-    axial_depth_mm: float | None = Field(description="As recommended_depth_mm.")
-    removal_rate_cm3_per_min: float | None = Field(description="null without a recommended depth, as are power and torque.")
-    power_kw: float | None
-    torque_nm: float | None
-    bound: str = Field(description="What stands against more depth: chatter, power, torque, speed or depth.")
-
-
 class Window(Answer):
     """Speeds at which a depth is allowed."""
 
@@ -421,9 +441,10 @@ class ToolingAdvice(Answer):
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
     recommended_by: str | None = Field(description="The method that computed the recommended cuts.")
     band: Band | None = Field(None, description="null without machines drawn from the records, or without a recommended cut.")
-    highest_removal: list[OperatingPoint]
+    highest_removal: list[RecommendedCut]
     windows: list[Window]
     planned: list[PlannedAnswer]
+    around: list[Limits] = Field([], description="Limits around the recommended cuts; there they replace a preview.")
     warnings: list[str]
 
 

@@ -22,7 +22,8 @@ from rcsa_ident.machine.machine import Machine
 from rcsa_ident.report.summaries import advice_summary, frf_summary, lobes_curves, lobes_summary
 from rcsa_ident.stability.methods import Watch
 from rcsa_ident.units import from_hz, to_hz, to_rpm
-from rcsa_ident.workflows.tool_change import TipAnswer, ToolChange, advise, spread_seconds
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import TipAnswer, ToolChange, spread_seconds
 from rcsa_ident.workflows.tool_change import tooltip as ask_tip
 
 MOST_LINES = 20_000

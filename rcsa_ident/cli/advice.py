@@ -107,7 +107,7 @@ def advise(
 ) -> None:
     """Tell the best speeds for a depth, the highest removal rate within power and torque, and the margin of planned cuts."""
     from rcsa_ident.io.lobes import write_advice
-    from rcsa_ident.workflows.tool_change import advise as ask
+    from rcsa_ident.workflows.advise import advise as ask
 
     check_plot(plot)
     for path in (out, card):

@@ -132,7 +132,8 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     from rcsa_ident.report.html import ToolingPage
     from rcsa_ident.report.summaries import entries_of
     from rcsa_ident.stability.lobes import stability_lobes
-    from rcsa_ident.workflows.tool_change import ToolChange, advise, tooltip
+    from rcsa_ident.workflows.advise import advise
+    from rcsa_ident.workflows.tool_change import ToolChange, tooltip
 
     name, tooling = named
     asked = tooltip(machine, tooling)
@@ -143,7 +144,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     advice = advise(change)
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
     write_tip_csv(out / f"FRF_{safe}.csv", response)
-    write_lobes(out / f"LOBES_{safe}.csv", advice.lobes, recommended=advice.usable.stable)
+    write_lobes(out / f"LOBES_{safe}.csv", advice.lobes, recommended=advice.usable.stable, preview=advice.preview)
     entries, known = entries_of(response), response.deviation()
     tip = {axis: response.between(str(row), str(col)) for axis, (row, col) in entries.items()}
     deviation = {axis: known[pair] for axis, pair in entries.items() if pair in known}

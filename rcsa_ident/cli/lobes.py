@@ -196,7 +196,8 @@ def tell_lobes(
     """Write and print the stability lobes of what is asked about, and what is recommended; options as of `lobes`, lengths in metres."""
     from rcsa_ident.io.lobes import write_lobes, write_map
     from rcsa_ident.io.tested_cuts import read_tested_cuts, write_tests
-    from rcsa_ident.workflows.tool_change import advise, map_of, probabilities_stable, surface_of
+    from rcsa_ident.workflows.advise import advise
+    from rcsa_ident.workflows.tool_change import map_of, probabilities_stable, surface_of
 
     stages = Stages(quiet=json_)
     with stages.stage("lobes"):
@@ -209,7 +210,7 @@ def tell_lobes(
         with stages.stage("map"):
             chart = map_of(change, map_depths, map_full)
         write_map(map_, chart)
-    write_lobes(out, found, surface, advice.usable.stable)
+    write_lobes(out, found, surface, advice.usable.stable, advice.preview)
     if tests_out is not None and cuts is not None:
         with stages.stage("tests"):
             write_tests(tests_out, cuts, probabilities_stable(change, cuts))
@@ -218,7 +219,7 @@ def tell_lobes(
 
         tested = None if cuts is None or advice.tested is None else Judged(cuts, advice.tested)
         save_figure(
-            stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart, usable=advice.usable), str(plot)
+            stability_figure(found, advice.recommended, None, tested, surface, chart, advice.usable, advice.drawn_around), str(plot)
         )
     if json_:
         from rcsa_ident.report.summaries import lobes_summary

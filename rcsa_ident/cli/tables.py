@@ -184,13 +184,12 @@ def show_lobes(advice: Advice) -> None:
         frequency = to_hz(lobes.absolute_frequency)
         out.print(f"stable at any speed up to {1e3 * lobes.absolute_limit:.3f} mm (chatter would start at {frequency:.0f} Hz)")
     heads = ("spindle speed\nrev/min", "recommended\ndepth mm", "stability\nlimit mm")
-    by = "" if advice.recommended_by in (None, lobes.method) else f", by {advice.recommended_by}"
+    by = "" if advice.recommended_by is None else f", by {advice.recommended_by}"
     table = _table(*heads, title=f"recommended cuts of the range{by}")
     for point in advice.recommended:
         table.add_row(f"{to_rpm(point.spindle_speed):.0f}", recommended_text(point), limit_text(point.limit, lobes.max_depth))
     show(table)
-    _tell_band(advice)
-    _tell_unlimited(advice)
+    _tell_reasons(advice)
     peaks = ", ".join(f"{limit_text(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in advice.pockets)
     out.print(f"highest stability limits: {peaks}")
 
@@ -202,12 +201,19 @@ def limit_text(depth: float, most: float) -> str:
 
 def recommended_text(point: OperatingPoint) -> str:
     """Return the recommended depth in mm, if there is one."""
-    return "none" if point.bound is Bound.DEPTH else f"{1e3 * point.depth:.2f}"
+    return "none" if point.depth == np.inf else f"{1e3 * point.depth:.2f}"
 
 
-def _tell_unlimited(advice: Advice) -> None:
-    """Say where no depth is recommended because none was searched that would be too deep."""
-    free = [point for point in advice.recommended if point.bound is Bound.DEPTH]
+def _tell_reasons(advice: Advice, about: str = "") -> None:
+    """Say how the first recommended depth follows from its limit, what dominates its band, and where no depth is recommended and why."""
+    first = next((point for point in advice.recommended if point.held is not None), None)
+    if first is not None:
+        console().print(f"{about}at {to_rpm(first.spindle_speed):.0f} rev/min: {first.held}")
+    _tell_band(advice, about)
+    for point in advice.recommended:
+        if point.why:
+            console().print(f"{about}at {to_rpm(point.spindle_speed):.0f} rev/min {point.why}")
+    free = [point for point in advice.recommended if point.depth == np.inf and not point.why]
     if free:
         at = " and ".join(f"{to_rpm(point.spindle_speed):.0f}" for point in free)
         console().print(f"at {at} rev/min {free[0].unlimited}; a larger --max-depth-mm looks deeper")
@@ -288,8 +294,7 @@ def show_points(advice: Advice) -> None:
             load = f"{to_cm3_per_min(p.removal_rate):.0f}", f"{1e-3 * p.power:.2f}", f"{p.torque:.1f}"
         table.add_row(*cells, *load, _against(p))
     show(table)
-    _tell_band(advice)
-    _tell_unlimited(advice)
+    _tell_reasons(advice)
 
 
 def _tell_band(advice: Advice, about: str = "") -> None:
@@ -356,8 +361,7 @@ def show_comparison(answers: Sequence[Advice]) -> None:
         table.add_row(escape(answer.tooling), lowest_mm, *cells)
     show(table)
     for answer in answers:
-        _tell_band(answer, f"{escape(answer.tooling)}, ")
-        _tell_unlimited(answer)
+        _tell_reasons(answer, f"{escape(answer.tooling)}, ")
 
 
 def show_peaks(rows: Mapping[str, tuple[float, float, float, float]]) -> None:

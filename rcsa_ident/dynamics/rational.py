@@ -20,6 +20,10 @@ _RANK = 1e-6
 _IDLE = 2
 #: Times the band's end beyond which a pole is no more than a part of the constant, which it would nearly cancel.
 _FAR = 20.0
+#: Most pairs of poles that functions with common poles take beside those that were nearly theirs.
+_FURTHER = 8
+#: How far beside the band a pole's flank is still seen, as a ratio.
+_FLANK = 1.2
 
 
 class FitStatus(StrEnum):
@@ -225,17 +229,86 @@ def _damped_outside(fit: RationalFit, omega: FloatArray, values: ComplexArray, z
     if near.all() and not outside.any():
         return fit
     pole = np.where(outside, size * complex(-zeta, np.sqrt(1.0 - zeta**2)), fit.pole)[near]
+    flat = values.reshape(1, omega.size, -1)
+    (residue,), (constant,) = _residues(omega, flat, np.ones(flat.shape[1:]), pole)
+    return replace(fit, pole=pole, residue=residue.reshape(-1, *fit.constant.shape), constant=constant.reshape(fit.constant.shape))
+
+
+def _residues(omega: FloatArray, values: ComplexArray, weight: FloatArray, pole: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """Residues, shape (d, m, e), and constants (d, e) of functions of e entries, shape (d, n, e), by least squares of weight (n, e)."""
     first, second = (1.0 / (1j * omega[:, None] - p) for p in (pole, pole.conj()))
     # the columns differ by many powers of ten
     basis = np.hstack([first + second, 1j * (first - second), np.ones((omega.size, 1))])
-    scale = np.linalg.norm(basis, axis=0) + 1e-300
-    residue, constant = np.empty((pole.size, *fit.constant.shape), dtype=complex), np.empty(fit.constant.shape)
-    for place in np.ndindex(fit.constant.shape):
-        value = values[:, *place]
-        columns, right = basis / scale, value
-        both = np.linalg.lstsq(np.vstack([columns.real, columns.imag]), np.concatenate([right.real, right.imag]), rcond=1e-13)[0] / scale
-        residue[:, *place], constant[place] = both[: pole.size] + 1j * both[pole.size : -1], both[-1]
-    return replace(fit, pole=pole, residue=residue, constant=constant)
+    residue, constant = np.empty((len(values), pole.size, values.shape[2]), dtype=complex), np.empty((len(values), values.shape[2]))
+    for e, own in enumerate(weight.T):
+        columns, right = own[:, None] * basis, own[:, None] * values[:, :, e].T
+        scale = np.linalg.norm(columns, axis=0)
+        # the second of a real pole is none
+        scale[scale == 0.0] = 1.0
+        columns = columns / scale
+        both = np.linalg.lstsq(np.vstack([columns.real, columns.imag]), np.vstack([right.real, right.imag]), rcond=1e-13)[0].T / scale
+        residue[:, :, e], constant[:, e] = both[:, : pole.size] + 1j * both[:, pole.size : -1], both[:, -1]
+    return residue, constant
+
+
+def common_poles(
+    omega: FloatArray, values: ComplexArray, start: ComplexArray, allowed: FloatArray, damped_outside: float = 0.0
+) -> ComplexArray:
+    """Return the poles that fit several functions best, by vector fitting from poles that are nearly theirs.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s]
+        Above 0.
+    values : complex array, shape (d, n, e)
+        Functions of e entries each.
+    start : complex array, shape (m,) [rad/s]
+    allowed : array, shape (n, e)
+        What a fit may be beside each of them.
+    damped_outside : float
+        As in `fitted_poles`, of poles whose flank is not seen.
+    """
+    beside = np.moveaxis(values, 0, 1).reshape(omega.size, -1)
+    problem = Problem.of(omega, beside, 1.0, np.tile(allowed, len(values)), None, True)
+    best = problem.settled(start / problem.top)
+    for _ in range(_FURTHER):
+        if best.rms <= 1.0:
+            break
+        best = min(best, problem.settled(best.with_pair(problem.omega)), key=lambda candidate: candidate.rms)
+    pole = best.pole * problem.top
+    size, damping = np.abs(pole), -pole.real / np.abs(pole)
+    inside = (size >= omega[0]) & (size <= omega[-1])
+    near = (size >= omega[0] / _FLANK) & (size <= _FLANK * omega[-1])
+    # the flank of a pole beside the band tells its damping, too, but none below that of the others
+    least = np.where(near, np.min(damping[inside], initial=damped_outside), damped_outside)
+    zeta = np.where(inside, damping, np.maximum(damping, least))
+    found: ComplexArray = np.where(zeta > damping, size * (-zeta + 1j * np.sqrt(1.0 - np.minimum(zeta, 1.0) ** 2)), pole)
+    return found[size <= _FAR * omega[-1]]
+
+
+def shared_residues(
+    omega: FloatArray, values: ComplexArray, allowed: FloatArray, pole: ComplexArray, shape: tuple[int, int]
+) -> tuple[list[PoleResidue], float]:
+    """Return functions that share their poles, each with residues of its own, and the largest share that is left of one of them.
+
+    Parameters
+    ----------
+    omega, allowed, pole
+        As in `common_poles`.
+    values : complex array, shape (d, n, e)
+    shape : (int, int)
+        Rows and columns that the e entries of a function stand for.
+    """
+    residue, constant = _residues(omega, values, 1.0 / allowed, pole)
+    fits = [
+        RationalFit(pole, own.reshape(-1, *shape), direct.reshape(shape), 0.0, 0.0, order_of(pole), FitStatus.CONVERGED)
+        for own, direct in zip(residue, constant, strict=True)
+    ]
+    left = [
+        np.linalg.norm(fit.response(omega).reshape(each.shape) - each) / np.linalg.norm(each)
+        for fit, each in zip(fits, values, strict=True)
+    ]
+    return [fit.modes() for fit in fits], float(max(left))
 
 
 def _finished(problem: Problem, pole: ComplexArray) -> RationalFit:

@@ -35,6 +35,11 @@ class Candidate:
         """Number of poles, both of each pair counted."""
         return order_of(self.pole)
 
+    def with_pair(self, omega: FloatArray, count: int = 2) -> ComplexArray:
+        """Return the poles and a pair, or so many, where the misfit is largest; frequencies scaled, shape (n,)."""
+        worst = omega[int(np.argmax(self.misfit))]
+        return np.concatenate([self.pole, _spaced(count, worst, worst) if count == 2 else np.array([-worst + 0.0j])])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
@@ -224,9 +229,7 @@ def growing(problem: Problem, highest: int) -> Iterator[Candidate]:
 def _best_of(problem: Problem, order: int, last: Candidate | None, low: float, high: float) -> Candidate:
     starts = [_spaced(order, low, high)]
     if last is not None and last.order < order:
-        worst = problem.omega[int(np.argmax(last.misfit))]
-        more = _spaced(order - last.order, worst, worst) if order - last.order == 2 else np.array([-worst + 0.0j])
-        starts.append(np.concatenate([last.pole, more]))
+        starts.append(last.with_pair(problem.omega, order - last.order))
     found = [problem.settled(start) for start in starts]
     return min((c for c in found if c.order == order), key=lambda c: c.rms, default=found[0])
 

@@ -17,7 +17,11 @@ from rcsa_ident.units import from_hz, from_rpm, to_cm3_per_min, to_hz, to_rpm
 
 
 def write_lobes(
-    path: str | Path, lobes: StabilityLobes, surface: SurfaceError | None = None, recommended: FloatArray | None = None
+    path: str | Path,
+    lobes: StabilityLobes,
+    surface: SurfaceError | None = None,
+    recommended: FloatArray | None = None,
+    preview: bool = False,
 ) -> None:
     """Write LOBES.csv; the band's columns are empty where even its edge is beyond the largest depth.
 
@@ -29,10 +33,14 @@ def write_lobes(
         At the same speeds: two further columns.
     recommended : array, shape (n,) [m], optional
         Recommended depths; by default those of the lobes alone, which look no further than their own speeds.
+    preview : bool
+        Whether the limits only say where to look: then neither a band nor recommended depths are written.
     """
-    band = lobes.band
-    extra = {} if band is None else {"limit_depth_low_mm": band[0] * 1e3, "limit_depth_high_mm": band[1] * 1e3}
-    extra["recommended_depth_mm"] = (lobes.recommended_depth() if recommended is None else recommended) * 1e3
+    band, extra = lobes.band, dict[str, FloatArray]()
+    if band is not None and not preview:
+        extra = {"limit_depth_low_mm": band[0] * 1e3, "limit_depth_high_mm": band[1] * 1e3}
+    if not preview:
+        extra["recommended_depth_mm"] = (lobes.recommended_depth() if recommended is None else recommended) * 1e3
     extra["flip"] = np.where(lobes.stable, np.nan, lobes.flip.astype(float))
     if surface is not None:
         extra |= {"surface_error_um": surface.largest * 1e6, "surface_error_mean_um": surface.mean * 1e6}

@@ -85,7 +85,7 @@ def advice_figure(answers: Sequence[Advice]) -> Figure:
     if len(answers) == 1:
         (answer,) = answers
         if answer.usable.removal_rate is None:
-            return stability_figure(answer.lobes, answer.recommended, usable=answer.usable)
+            return stability_figure(answer.lobes, answer.recommended, usable=answer.usable, around=answer.drawn_around)
         recommended, planned = ([_mark(cut) for cut in cuts] for cuts in (answer.recommended, answer.planned))
         return usable_figure(answer.usable, recommended, planned, answer.common)
     deep = {answer.tooling: [cut for cut in answer.recommended if cut.removal_rate is not None] for answer in answers}

@@ -310,7 +310,10 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
         "lobes": ""
         if page.advice is None
         else figures.svg(
-            stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable), f"lobes{number}"
+            stability_figure(
+                page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable, around=page.advice.drawn_around
+            ),
+            f"lobes{number}",
         ),
         "recommended": [] if found is None else found["recommended"],
         "band": "" if page.advice is None or page.advice.band is None else page.advice.band.words,

@@ -60,6 +60,7 @@ def stability_figure(
     surface: SurfaceError | None = None,
     chart: StabilityMap | None = None,
     usable: UsableDepths | None = None,
+    around: Sequence[StabilityLobes] | None = None,
 ) -> Figure:
     """Stability limit and recommended depth over spindle speed, the recommended cuts marked, the chatter frequency below.
 
@@ -78,6 +79,8 @@ def stability_figure(
         Tells the cuts that are stable above the first limit.
     usable : UsableDepths, optional
         The recommended depths; by default those of the lobes alone.
+    around : sequence of StabilityLobes, optional
+        Limits around the recommended cuts, with bands of their own; the lobes are then drawn as the preview that they are.
     """
     rows = (2.2, 1.0) if surface is None else (2.2, 1.0, 1.0)
     figure, grid = _grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")
@@ -86,7 +89,9 @@ def stability_figure(
         max_depth, ceiling = lobes.max_depth, _ceiling(lobes, tested)
         if chart is not None:
             ceiling = 1e3 * float(chart.depth[-1])
-        _draw_limit(top, lobes, ceiling, chart)
+        _draw_limit(top, lobes, ceiling, chart, preview=around is not None)
+        for k, each in enumerate(around or ()):
+            _draw_exact(top, each, named=k == 0)
         if true_limit is not None:
             top.plot(
                 to_rpm(lobes.spindle_speed), 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF"
@@ -94,7 +99,7 @@ def stability_figure(
         if lobes.absolute_limit is not None and lobes.absolute_limit < max_depth:
             label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
             top.axhline(1e3 * lobes.absolute_limit, color=_GREY, ls=":", lw=1.2, label=label)
-        if recommended:
+        if recommended and around is None:
             speed, depth = lobes.ordered().spindle_speed, lobes.ordered().recommended_depth()
             if usable is not None:
                 speed, depth = usable.spindle_speed, usable.stable
@@ -105,7 +110,8 @@ def stability_figure(
                 top.plot(x, y, "v", color=_GREEN, ms=8.0)
             # above the limit, where no line crosses it
             above = (x, min(1e3 * point.limit, 0.86 * ceiling))
-            text = f"{x:.0f} rev/min\n" + (f"{y:.2f} mm" if point.depth < np.inf else f"no limit up to {1e3 * point.limit:g} mm")
+            none = "no depth recommended" if point.why else f"no limit up to {1e3 * point.limit:g} mm"
+            text = f"{x:.0f} rev/min\n" + (f"{y:.2f} mm" if point.depth < np.inf else none)
             top.annotate(text, above, xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
         if tested is not None:
             _draw_tested(top, tested)
@@ -128,8 +134,19 @@ def _ceiling(lobes: StabilityLobes, tested: Judged | None) -> float:
     return ceiling if tested is None else max(ceiling, 1.08e3 * float(tested.cuts.axial_depth.max()))
 
 
-def _draw_limit(ax: Axes, lobes: StabilityLobes, ceiling: float, chart: StabilityMap | None = None, bands: bool = True) -> None:
-    max_depth, band = lobes.max_depth, lobes.band if bands else None
+def _draw_exact(ax: Axes, lobes: StabilityLobes, named: bool) -> None:
+    """Limits around a recommended cut, with their band."""
+    speed, limit = to_rpm(lobes.spindle_speed), 1e3 * lobes.nominal
+    if lobes.band is not None:
+        low, high = (1e3 * np.minimum(edge, lobes.max_depth) for edge in lobes.band)
+        ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="its 95 % uncertainty band" if named else None)
+    ax.plot(speed, limit, color=COLOURS["X"], lw=2.0, label=f"stability limit, {lobes.method}" if named else None)
+
+
+def _draw_limit(
+    ax: Axes, lobes: StabilityLobes, ceiling: float, chart: StabilityMap | None = None, bands: bool = True, preview: bool = False
+) -> None:
+    max_depth, band = lobes.max_depth, lobes.band if bands and not preview else None
     speed, limit = to_rpm(lobes.spindle_speed), 1e3 * np.minimum(lobes.limit_depth, max_depth)
     if chart is None:
         ax.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
@@ -139,7 +156,10 @@ def _draw_limit(ax: Axes, lobes: StabilityLobes, ceiling: float, chart: Stabilit
     if band is not None:
         low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
         ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % uncertainty band")
-    ax.plot(speed, limit, color=COLOURS["X"], label="stability limit")
+    if preview:
+        ax.plot(speed, limit, ":", color=COLOURS["X"], lw=1.1, label=f"preview, {lobes.method}")
+    else:
+        ax.plot(speed, limit, color=COLOURS["X"], label="stability limit")
     if np.any(lobes.flip):
         ax.plot(speed[lobes.flip], limit[lobes.flip], "o", color="#CC79A7", ms=3.5, label="by period doubling")
     _name_sides(ax)

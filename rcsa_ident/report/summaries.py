@@ -19,7 +19,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.tap import TapFrf
-from rcsa_ident.stability.advice import Advice, OperatingPoint, PlannedCut
+from rcsa_ident.stability.advice import Advice, HeldBack, OperatingPoint, PlannedCut
 from rcsa_ident.stability.dominance import BandShares
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
@@ -266,7 +266,7 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
             for pocket in advice.pockets
         ],
         "recommended_by": advice.recommended_by,
-        "recommended": [_recommended(point, lobes) for point in advice.recommended],
+        "recommended": [_point(point, lobes) for point in advice.recommended],
         "withheld": lobes.withheld or None,
         "band": band_summary(advice.band),
         "flip_speeds": int(lobes.flip.sum()),
@@ -275,17 +275,29 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
 
 
 def lobes_curves(advice: Advice) -> dict[str, Any]:
-    """Return stability limits over speed; None belongs to a cut that is stable up to the depth that was asked for."""
-    lobes, band = advice.lobes, advice.lobes.band
+    """Return stability limits over speed; None belongs to a cut that is stable up to the depth that was asked for.
+
+    A preview has neither band nor recommended depths; limits around the recommended cuts have bands of their own.
+    """
+    lobes = advice.lobes
+    recommended = np.full(lobes.spindle_speed.shape, np.nan) if advice.preview else advice.usable.stable
+    return {
+        **_limits(lobes, band=not advice.preview),
+        "recommended_depth_mm": _finite_list(1e3 * recommended),
+        "lobe": [None if n < 0 else n for n in lobes.lobe.tolist()],
+        "flip": lobes.flip.tolist(),
+        "around": [_limits(each) for each in advice.around],
+    }
+
+
+def _limits(lobes: StabilityLobes, band: bool = True) -> dict[str, Any]:
+    low, high = (lobes.band or (None, None)) if band else (None, None)
     return {
         "spindle_speed_rpm": to_rpm(lobes.spindle_speed, 6).tolist(),
         "limit_depth_mm": _finite_list(lobes.limit_depth * 1e3),
-        "limit_depth_low_mm": None if band is None else _finite_list(band[0] * 1e3),
-        "limit_depth_high_mm": None if band is None else _finite_list(band[1] * 1e3),
-        "recommended_depth_mm": _finite_list(1e3 * advice.usable.stable),
+        "limit_depth_low_mm": None if low is None else _finite_list(low * 1e3),
+        "limit_depth_high_mm": None if high is None else _finite_list(high * 1e3),
         "chatter_frequency_hz": _finite_list(to_hz(lobes.chatter_frequency)),
-        "lobe": [None if n < 0 else n for n in lobes.lobe.tolist()],
-        "flip": lobes.flip.tolist(),
     }
 
 
@@ -316,6 +328,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
             for w in advice.windows
         ],
         "planned": [_planned(cut) for cut in advice.planned],
+        "around": [_limits(each) for each in advice.around],
     }
 
 
@@ -327,22 +340,27 @@ def band_summary(band: BandShares | None) -> dict[str, Any] | None:
     return {"deviation_percent": 100.0 * band.deviation, "shares": shares, "in_words": band.words}
 
 
-def _recommended(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:
+def _point(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:
+    depth, held = finite(point.depth, 1e3), point.held
     return {
         "spindle_speed_rpm": to_rpm(point.spindle_speed, 6),
-        "recommended_depth_mm": finite(point.depth, 1e3),
+        "recommended_depth_mm": depth,
         "limit_depth_mm": None if point.limit >= lobes.max_depth else point.limit * 1e3,
-    }
-
-
-def _point(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:
-    return _recommended(point, lobes) | {
-        "axial_depth_mm": finite(point.depth, 1e3),
+        "axial_depth_mm": depth,
         "removal_rate_cm3_per_min": None if point.removal_rate is None else to_cm3_per_min(point.removal_rate),
         "power_kw": None if point.power is None else point.power * 1e-3,
         "torque_nm": point.torque,
         "bound": str(point.bound),
+        "why": point.why or None,
+        "held_back": None if held is None else _held_back(held, lobes.max_depth),
     }
+
+
+def _held_back(held: HeldBack, max_depth: float) -> dict[str, Any]:
+    steps = {"within_tolerance_mm": held.within_tolerance, "with_probability_mm": held.with_probability, "less_reserve_mm": held.depth}
+    depths = {name: None if depth is None or depth >= max_depth else 1e3 * depth for name, depth in steps.items()}
+    shares = {"tolerance": held.tolerance, "probability": held.probability, "reserve": held.reserve}
+    return depths | {f"{name}_percent": 100.0 * share for name, share in shares.items()} | {"in_words": str(held)}
 
 
 def _planned(cut: PlannedCut) -> dict[str, Any]:

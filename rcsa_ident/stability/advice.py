@@ -14,6 +14,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.dominance import BandShares
+from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.pockets import peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
@@ -31,6 +32,9 @@ class Bound(StrEnum):
     TORQUE = "torque"
     SPEED = "speed"
     DEPTH = "depth"
+    #: The depth is beyond the tool's cutting edge, or the vibration at the limit outside of the frequencies that are known.
+    EDGE = "edge"
+    FREQUENCY = "frequency"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -177,6 +181,42 @@ def _taken(process: MillingProcess, deepest: float) -> _Taken:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
+class HeldBack(Shown):
+    """How a recommended depth follows from the stability limit, step by step.
+
+    Parameters
+    ----------
+    limit : float [m]
+        At the speed itself.
+    within_tolerance : float [m]
+        The lowest limit within the tolerance of the speed.
+    with_probability : float or None [m]
+        Up to which so large a share of the possible machines is stable within that tolerance; None where none were drawn.
+    depth : float [m]
+        Less the reserve.
+    tolerance, probability, reserve : float
+        Shares.
+    """
+
+    limit: float
+    within_tolerance: float
+    with_probability: float | None
+    depth: float
+    tolerance: float
+    probability: float
+    reserve: float
+
+    def __str__(self) -> str:
+        steps = [
+            f"stability limit {1e3 * self.limit:.2f} mm",
+            f"{1e3 * self.within_tolerance:.2f} mm within ±{100.0 * self.tolerance:g} % of the speed",
+        ]
+        if self.with_probability is not None:
+            steps.append(f"{1e3 * self.with_probability:.2f} mm with a probability of {100.0 * self.probability:g} %")
+        return " → ".join([*steps, f"{1e3 * self.depth:.2f} mm less {100.0 * self.reserve:g} %"])
+
+
+@dataclass(frozen=True, slots=True, repr=False)
 class OperatingPoint(Shown):
     """A cut that is recommended.
 
@@ -193,6 +233,10 @@ class OperatingPoint(Shown):
         None without a feed or a depth, as are power and torque.
     power : float or None [W]
     torque : float or None [N m]
+    held : HeldBack or None
+        How the depth follows from the limit, where chatter limits it.
+    why : str
+        Why no depth is recommended; empty where one is.
     """
 
     spindle_speed: float
@@ -202,6 +246,8 @@ class OperatingPoint(Shown):
     removal_rate: float | None
     power: float | None
     torque: float | None
+    held: HeldBack | None = None
+    why: str = ""
 
     def __str__(self) -> str:
         if self.depth == np.inf:
@@ -215,7 +261,21 @@ class OperatingPoint(Shown):
     @property
     def unlimited(self) -> str:
         """What is said in place of a depth where none is recommended."""
-        return f"nothing up to {1e3 * self.limit:g} mm limits the cut, so no depth is recommended"
+        return self.why or f"nothing up to {1e3 * self.limit:g} mm limits the cut, so no depth is recommended"
+
+    def without_depth(self, bound: Bound, why: str) -> OperatingPoint:
+        """Return the same speed and limit, where for a reason no depth is recommended."""
+        return OperatingPoint(self.spindle_speed, np.inf, self.limit, bound, None, None, None, None, why)
+
+
+def operating_point(
+    process: MillingProcess, speed: float, depth: float, limit: float, bound: Bound, held: HeldBack | None = None
+) -> OperatingPoint:
+    """Return a recommended cut with what it takes from the spindle, as far as a feed and a depth tell it."""
+    if process.feed_per_tooth is None or depth == np.inf:
+        return OperatingPoint(speed, depth, limit, bound, None, None, None, held)
+    load = spindle_load(process.cutter, process.conditions(speed, depth), process.coefficients)
+    return OperatingPoint(speed, depth, limit, bound, load.removal_rate, load.power, load.torque, held)
 
 
 def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 3) -> list[OperatingPoint]:
@@ -228,13 +288,8 @@ def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 
     for speed, _ in peaks(usable.spindle_speed, level, count):
         place = int(np.argmin(np.abs(usable.spindle_speed - speed)))
         at, depth, limit = (float(values[place]) for values in (usable.spindle_speed, usable.depth, usable.limit))
-        if depth <= 0.0:
-            continue
-        if process.feed_per_tooth is None or depth == np.inf:
-            found.append(OperatingPoint(at, depth, limit, usable.bound[place], None, None, None))
-        else:
-            load = spindle_load(process.cutter, process.conditions(at, depth), process.coefficients)
-            found.append(OperatingPoint(at, depth, limit, usable.bound[place], load.removal_rate, load.power, load.torque))
+        if depth > 0.0:
+            found.append(operating_point(process, at, depth, limit, usable.bound[place]))
     return found
 
 
@@ -364,8 +419,12 @@ def planned_cut(
     depth: float,
     tolerance: float = TOLERANCE,
     probability: float = PROBABILITY,
+    judged: StabilityLobes | None = None,
 ) -> PlannedCut:
-    """Return how a cut stands; its speed is one of those of the lobes (`pad_speeds` puts it among them)."""
+    """Return how a cut stands; its speed is one of those of the lobes (`pad_speeds` puts it among them).
+
+    `judged`, limits around that speed by a method that fits the cut, tell all but where chatter begins beside it.
+    """
     depth = positive("depth", depth, "m")
     speeds = lobes.spindle_speed
     place = int(np.argmin(np.abs(speeds - positive("speed", speed, "rad/s"))))
@@ -376,13 +435,16 @@ def planned_cut(
     below, above = np.flatnonzero(other[:place]), np.flatnonzero(other[place + 1 :])
     slower = _crossing(speeds, nominal, int(below[-1]), depth) if below.size else None
     faster = _crossing(speeds, nominal, place + int(above[0]), depth) if above.size else None
+    if judged is not None:
+        lobes, place = judged, int(np.argmin(np.abs(judged.spindle_speed - speed)))
     load = spindle_load(process.cutter, process.conditions(speed, depth), process.coefficients)
-    power, torque = drive.power_at(speeds[place : place + 1])[0], drive.torque_at(speeds[place : place + 1])[0]
+    at = np.array([speed])
+    power, torque = drive.power_at(at)[0], drive.torque_at(at)[0]
     with np.errstate(divide="ignore"):
         share = float(np.max(np.array([load.power, load.torque]) / np.array([power, torque])))
     lowest = lobes.recommended_depth(tolerance, probability, reserve=0.0)[place]
     return PlannedCut(
-        float(speeds[place]),
+        speed,
         depth,
         float(lobes.limit_depth[place]),
         float(lowest),
@@ -426,6 +488,9 @@ class Advice(Drawn):
         The method that computed recommended cuts and pockets; None where nothing was to be recommended.
     band : BandShares or None
         What the band of the first recommended cut's limit consists of, where machines were drawn.
+    around : tuple of StabilityLobes
+        Limits around the recommended cuts, by the method that computed them, with bands of their own: there they take the place of a
+        preview.
 
     Examples
     --------
@@ -453,6 +518,17 @@ class Advice(Drawn):
     pockets: tuple[Pocket, ...] = ()
     recommended_by: str | None = None
     band: BandShares | None = None
+    around: tuple[StabilityLobes, ...] = ()
+
+    @property
+    def preview(self) -> bool:
+        """Whether the lobes are zero-order ones: they say where to look, not how deep one may cut."""
+        return self.lobes.method == MethodName.ZERO_ORDER
+
+    @property
+    def drawn_around(self) -> tuple[StabilityLobes, ...] | None:
+        """Limits that a figure draws over a preview; None where the lobes are none."""
+        return self.around if self.preview else None
 
     @property
     def common(self) -> FloatArray | None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.conditions import widest
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.rows import rows_of
@@ -15,6 +17,8 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability.axial_doubt import axial_doubt
+from rcsa_ident.stability.drawn_modes import drawn_tips, of_draw
+from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes, fitted_modes, known_modes, receptance_of
@@ -25,6 +29,8 @@ _ZERO_ORDER = ZeroOrder()
 DRAWS = 60
 #: How much deeper than asked for the zero-order method looks, for proportions.
 DEEPER = 5.0
+#: Between speeds at which drawn machines are asked by their own period maps, as a share.
+APART = 0.015
 
 
 def stability_lobes(
@@ -63,8 +69,7 @@ def stability_lobes(
 
     Notes
     -----
-    Drawn machines are asked by the zero-order method, in milliseconds each; of another method's limit they are in the proportion
-    that they have to the zero-order limit of the tip itself at the same speed, which the warnings say.
+    Drawn machines are asked by the zero-order method where that is the method, else each by its own period map (`own_drawn_limits`).
 
     Examples
     --------
@@ -106,6 +111,7 @@ def _limits(
     """What `stability_lobes` returns, of the cylinder."""
     plain = process.is_plain
     both = (tip.planar if plain else tip) if isinstance(tip, TipModes) else directions_for(process, tip)
+    modes = both if isinstance(both, TipModes) else None
     if isinstance(both, TipModes) or method.needs == "receptance":
         found = method.lobes(both, process, speeds, max_depth)
     else:
@@ -122,10 +128,8 @@ def _limits(
         return found
     if isinstance(method, ZeroOrder):
         return replace(found, drawn=drawn_limits(tip, process, speeds, max_depth, draws, seed))
-    drawn = drawn_limits(tip, process, speeds, DEEPER * max_depth, draws, seed)
-    nominal = _ZERO_ORDER.lobes(both, process, speeds, DEEPER * max_depth).limit_depth
-    told = "the uncertainty band is scaled from the zero-order method's"
-    return replace(found, drawn=in_proportion(drawn, nominal, found.limit_depth), warnings=(*found.warnings, told))
+    modes = fitted_modes(directions_for(process, tip))[0] if modes is None else modes
+    return replace(found, drawn=own_drawn_limits(tip, modes, process, found, draws, seed))
 
 
 def _axial(tip: Receptance | TipModes, process: MillingProcess, found: StabilityLobes) -> str:
@@ -151,14 +155,80 @@ def drawn_limits(
     Infinite beyond `max_depth`. They are told from a part of the frequencies: close where the tip's receptance changes from line to line,
     far apart where a quintic goes through it.
     """
+    drawn = _draws(tip, process, draws, seed)
+    return _ZERO_ORDER.depths(drawn.omega, drawn.tips, process, speeds, max_depth, drawn.factors)
+
+
+def own_drawn_limits(
+    tip: UncertainReceptance, modes: TipModes, process: MillingProcess, known: StabilityLobes, draws: int = DRAWS, seed: int = 1
+) -> FloatArray:
+    """Return the limits of the same tips by their own period maps, shape (draws, n) [m], infinite beyond the largest depth.
+
+    Parameters
+    ----------
+    tip : UncertainReceptance
+    modes : TipModes
+        That stand for it.
+    process : MillingProcess
+    known : StabilityLobes
+        Of the tip itself, by a method that fits the cut.
+    draws, seed : int
+
+    Notes
+    -----
+    Of many speeds some `APART` from each other are asked, and those where the limit is highest or lowest beside its neighbours; between
+    them the ratio to the limit of the tip itself is a straight line.
+    """
+    drawn, speeds, deepest = _draws(tip, process, draws, seed), known.spindle_speed, known.max_depth
+    tips = drawn_tips(drawn.omega, drawn.middle, drawn.tips, modes, of_draw(process, drawn.factors, draws))
+    order = np.argsort(speeds, kind="stable")
+    limit = known.nominal[order]
+    places = _telling(speeds[order], limit)
+    own = speeds[order][places]
+    # where to look first: in the proportion of the zero-order limits
+    looked = [
+        _ZERO_ORDER.depths(drawn.omega, each, process, own, DEEPER * deepest, factors)
+        for each, factors in ((drawn.tips, drawn.factors), (drawn.middle[None], None))
+    ]
+    guess = in_proportion(looked[0], looked[1][0], limit[places])
+    found = tips.limits(FullDiscretisation().monodromy(modes, process), own, known.limit_depth[order][places], guess, deepest)
+    ratio = np.log(np.minimum(found, deepest) / limit[places])
+    whole = np.array([limit * np.exp(np.interp(speeds[order], own, each)) for each in ratio])
+    limits = np.empty_like(whole)
+    limits[:, order] = np.where(whole < deepest * (1.0 - 1e-9), whole, np.inf)
+    return limits
+
+
+def _telling(speeds: FloatArray, limit: FloatArray) -> NDArray[np.intp]:
+    """Places of rising speeds that tell a curve: some far apart, its peaks and valleys, and their neighbours."""
+    step = np.floor(np.log(speeds / speeds[0]) / np.log1p(APART))
+    kept = np.concatenate([[True], np.diff(step) > 0.0])
+    kept[-1] = True
+    turns = np.flatnonzero((limit[1:-1] - limit[:-2]) * (limit[2:] - limit[1:-1]) < 0.0) + 1
+    for beside in (-1, 0, 1):
+        kept[turns + beside] = True
+    return np.flatnonzero(kept)
+
+
+class _Draws(NamedTuple):
+    """Tips drawn from a spread: frequencies, the middle (n, r, r), draws (d, n, r, r), factors of K_tc and K_rc / K_tc (d, 2) or None."""
+
+    omega: FloatArray
+    middle: ComplexArray
+    tips: ComplexArray
+    factors: FloatArray | None
+
+
+def _draws(tip: UncertainReceptance, process: MillingProcess, draws: int, seed: int) -> _Draws:
     nodes, known = tip.thinned(), process.coefficients
-    tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes, TIP if process.is_plain else known_directions(nodes))
+    wanted = TIP if process.is_plain else known_directions(nodes)
+    tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes, wanted)
     factors = None
     if known.tangential_spread or known.ratio_spread:
         # from draws of their own, so that machines are the same ones whatever is known of the coefficients
         weights = np.random.default_rng([seed, 1]).standard_normal((draws, 2))
         factors = np.exp(weights * (known.tangential_spread, known.ratio_spread))
-    return _ZERO_ORDER.depths(nodes.omega, tips, process, speeds, max_depth, factors)
+    return _Draws(nodes.omega, embedded(nodes.values[None], nodes, wanted)[0], tips, factors)
 
 
 def asked_directions(process: MillingProcess) -> tuple[Coordinate, ...]:

@@ -168,12 +168,7 @@ class StabilityLobes(Drawn):
         >>> bool((lobes.limit_quantile(0.95) < lobes.limit_depth).all())
         True
         """
-        if not 0.0 < probability <= 1.0:
-            raise InputError("probability", probability, "above 0 and not above 1")
-        if self.drawn is None:
-            return self.nominal
-        ranked = np.sort(np.minimum(self.drawn, self.max_depth), axis=0)
-        return ranked[int((1.0 - probability) * ranked.shape[0] + 1e-9)]
+        return self.nominal if self.drawn is None else _held_by(np.minimum(self.drawn, self.max_depth), probability)
 
     def probability(self, place: int, depth: float) -> float | None:
         """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them.
@@ -224,8 +219,28 @@ class StabilityLobes(Drawn):
             raise InputError("reserve", reserve, "a share from 0 to below 1")
         if self.withheld:
             return np.full(self.spindle_speed.shape, np.nan)
-        least = least_within_tolerance(self.spindle_speed, self.limit_quantile(probability), tolerance)
-        return self.searched((1.0 - reserve) * least, reserve)
+        return self.searched((1.0 - reserve) * self.robust_limit(tolerance, probability), reserve)
+
+    def robust_limit(self, tolerance: float = TOLERANCE, probability: float = PROBABILITY) -> FloatArray:
+        """Return the depth that is stable within a share of each speed on this share of the drawn machines, shape (n,) [m].
+
+        Each machine counts with its own lowest limit within the tolerance; the nominal one is never exceeded. Speeds rise.
+
+        Examples
+        --------
+        >>> import rcsa_ident as ri
+        >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
+        >>> process = ri.CutSpec().process(tool.cutter, machine.workpiece)
+        >>> lobes = ri.stability_lobes(machine.tip(tool), process, ri.rpm(14_000, 15_000, 100), 5e-3)
+        >>> bool((lobes.robust_limit() < lobes.limit_quantile(0.95)).all())
+        True
+        """
+        least = least_within_tolerance(self.spindle_speed, self.nominal, tolerance)
+        if self.drawn is None:
+            return least
+        drawn = np.minimum(self.drawn, self.max_depth)
+        each = np.array([least_within_tolerance(self.spindle_speed, limit, tolerance) for limit in drawn])
+        return np.minimum(least, _held_by(each, probability))
 
     def searched(self, depth: FloatArray, reserve: float = 0.0) -> FloatArray:
         """Return depths with infinity in place of what is as deep as the search went, less a reserve: no limit was found there."""
@@ -312,3 +327,10 @@ class StabilityLobes(Drawn):
         anywhere = f", stable below {1e3 * (self.absolute_limit or 0.0):.2f} mm at any speed" if known else ""
         best = self.best_speeds(1)
         return f"{self.method}, {low:.0f} to {high:.0f} rev/min{anywhere}" + (f"; best {best[0]}" if best else "")
+
+
+def _held_by(limits: FloatArray, probability: float) -> FloatArray:
+    """The depth up to which at least this share of some limits, shape (d, n), is stable, shape (n,)."""
+    if not 0.0 < probability <= 1.0:
+        raise InputError("probability", probability, "above 0 and not above 1")
+    return np.sort(limits, axis=0)[int((1.0 - probability) * limits.shape[0] + 1e-9)]

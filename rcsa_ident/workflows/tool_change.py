@@ -5,32 +5,27 @@ Command line, service, page, report and a script ask here, so that all of them s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.rcsa import couple
-from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.errors import InputError
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
-from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
-from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.label_noise import LabelNoise
-from rcsa_ident.stability.lobes import DEEPER, DRAWS, asked_directions, both_directions, directions_for, in_proportion, stability_lobes
+from rcsa_ident.stability.lobes import APART, DRAWS, asked_directions, both_directions, directions_for, own_drawn_limits, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
-from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
-from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
+from rcsa_ident.stability.monodromy import MonodromyOperator
+from rcsa_ident.stability.pockets import pad_speeds
+from rcsa_ident.stability.result import TOLERANCE, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
@@ -49,10 +44,8 @@ ABOVE, _ABOVE_STEP, CRITICAL, _ABOVE_EVERY = 2.5, from_hz(10.0), 0.7, 4
 _SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
 #: A machine that changes with speed costs so many further seconds, and so many the modes of a tip.
 _CHANGING_SECONDS, _FIT_SECONDS = 4.0, 1.0
-#: What recommendations are computed by where the lobes are a preview, and at about how many speeds.
-_FITTING, _FITTED_SPEEDS = FullDiscretisation(), 35
-_UNLIMITED = SpindleDrive.flat(None, None, None)
-Place = TypeVar("Place", OperatingPoint, Pocket)
+#: What recommendations are computed by, and at about how many speeds; what the limit of a drawn machine costs of a limit.
+_FITTING, _FITTED_SPEEDS, _DRAWN = FullDiscretisation(), 35, 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +107,21 @@ def tooltip(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Fitting:
+    """Limits by a method that fits the cut, and the cut itself at those speeds.
+
+    Parameters
+    ----------
+    lobes : StabilityLobes
+    cuts : tuple of (speeds [rad/s], MonodromyOperator)
+        One for each block of speeds that share a tip; none where limits come from labels.
+    """
+
+    lobes: StabilityLobes
+    cuts: tuple[tuple[FloatArray, MonodromyOperator], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class ToolChange:
     """A tooling on a machine, and the cut that is asked about.
 
@@ -170,8 +178,13 @@ class ToolChange:
         if not (zero_order and self.machine.prepared):
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
-        if zero_order and self.recommend:
-            found += _FIT_SECONDS + _FITTED_SPEEDS * float(np.mean(self._seconds_of(_FITTING, self.speeds)))
+        each = float(np.mean(self._seconds_of(_FITTING, self.speeds)))
+        drawn = self.draws * _DRAWN
+        if self.recommend:
+            found += _FIT_SECONDS + _FITTED_SPEEDS * each * (1.0 + drawn)
+        if not zero_order:
+            # limits of drawn machines are asked at speeds apart, and at each where the limit turns
+            found += min(speeds.size, np.log(speeds[-1] / speeds[0]) / np.log1p(APART) + 20.0) * each * drawn
         return found
 
     def _seconds_of(self, method: StabilityMethod, speeds: FloatArray) -> FloatArray:
@@ -199,17 +212,22 @@ class ToolChange:
             parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
         return StabilityLobes.joined(parts, order)
 
-    def fitting_limits(self, speeds: FloatArray) -> StabilityLobes:
-        """Return the limits at rising speeds by the method that fits any cut; drawn machines are in their zero-order proportion."""
-        parts, order = [], []
-        for places, tip in self.tips(speeds):
+    def fitting_limits(self, speeds: FloatArray, draws: int | None = None) -> Fitting:
+        """Return the limits at rising speeds by the method that fits any cut, each drawn machine's by its own period map."""
+        draws, process = self.draws if draws is None else draws, self.process
+        if isinstance(self.machine, LearntTip):
+            # its limits are those of the draws, and their error is that of the method which they were learnt by
+            return Fitting(self.machine.limits(process, speeds, self.max_depth, draws), ())
+        parts, order, cuts = [], [], []
+        for places, tip in self.tips(speeds, spread=draws > 1):
+            modes = modes_of(tip, process)
+            found = _FITTING.lobes(modes, process, speeds[places], self.max_depth)
+            if draws > 1 and isinstance(tip, UncertainReceptance) and tip.complete:
+                found = replace(found, drawn=own_drawn_limits(tip, modes, process, found, draws))
             order.append(places)
-            parts.append(_FITTING.lobes(modes_of(tip, self.process), self.process, speeds[places], self.max_depth))
-        found = StabilityLobes.joined(parts, order)
-        preview = self.limits(speeds, DEEPER * self.max_depth)
-        if preview.drawn is None:
-            return found
-        return replace(found, drawn=in_proportion(preview.drawn, preview.limit_depth, found.limit_depth))
+            parts.append(found)
+            cuts.append((speeds[places], _FITTING.monodromy(modes, process)))
+        return Fitting(StabilityLobes.joined(parts, order), tuple(cuts))
 
     def remarks(self, lobes: StabilityLobes) -> tuple[str, ...]:
         """Return what speaks against limits."""
@@ -235,138 +253,11 @@ class ToolChange:
         return [*([told] if deeper else []), *_modes_above(self.machine, self.tooling, self.omega)]
 
 
-def advise(
-    change: ToolChange,
-    drive: SpindleDrive = _UNLIMITED,
-    tolerance: float = TOLERANCE,
-    probability: float = PROBABILITY,
-    reserve: float = RESERVE,
-    depth: float | None = None,
-    planned: Sequence[tuple[float, float]] = (),
-    tested: TestedCuts | None = None,
-) -> Advice:
-    """Return the stability limits of a tooling, and what is recommended within them.
-
-    Parameters
-    ----------
-    change : ToolChange
-    drive : SpindleDrive
-        What the spindle has; without a feed per tooth its power and torque cannot be asked.
-    tolerance, probability, reserve : float
-        What a recommendation holds back: see `StabilityLobes.recommended_depth`.
-    depth : float or None [m]
-        At which speeds may one cut so deep?
-    planned : sequence of (speed [rad/s], depth [m])
-        How far are these cuts from chatter?
-    tested : TestedCuts or None
-        Cuts that were tried: how many do the limits tell right?
-    """
-    process = change.process
-    if depth is not None and 0.0 <= reserve < 1.0:
-        # twice as deep as tells whether this depth may be cut: straight lines to the limits beside it show where its windows end
-        change = replace(change, max_depth=max(change.max_depth, 2.0 * depth / (1.0 - reserve)))
-    wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
-    low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
-
-    def usable_of(limits: StabilityLobes) -> UsableDepths:
-        return usable_depths(limits, process, drive, tolerance, probability, reserve)
-
-    usable = usable_of(wide).between(low, high)
-    lobes = wide.between(low, high)
-    found = _recommended(change, lobes, usable, usable_of, tolerance)
-    return Advice(
-        change.tooling.name,
-        None if isinstance(change.tooling, BareCutter) else change.tooling.assembly.stickout,
-        lobes,
-        usable,
-        found.points,
-        () if depth is None else tuple(speed_windows(usable, depth)),
-        tuple(planned_cut(wide, process, drive, speed, at, tolerance, probability) for speed, at in planned),
-        None if tested is None else classify_tested_cuts(change, tested),
-        tuple(dict.fromkeys([*change.remarks(lobes), *found.remarks])),
-        found.pockets,
-        found.by,
-        _band_of(change, found.points[0].spindle_speed, tolerance) if found.points and lobes.drawn is not None else None,
-    )
-
-
-def _band_of(change: ToolChange, speed: float, tolerance: float) -> BandShares | None:
-    """What the band of the limit at a recommended speed consists of."""
-    ((_, tip),) = change.tips(np.array([speed]), change.omega, spread=True)
-    return band_shares(tip, change.process, speed, change.max_depth, tolerance) if isinstance(tip, UncertainReceptance) else None
-
-
-@dataclass(frozen=True, slots=True)
-class _Recommended:
-    """Recommended cuts, pockets, the method behind them, and what speaks against them."""
-
-    points: tuple[OperatingPoint, ...]
-    pockets: tuple[Pocket, ...]
-    by: str | None
-    remarks: tuple[str, ...] = ()
-
-
-def _recommended(
-    change: ToolChange, lobes: StabilityLobes, usable: UsableDepths, usable_of: Callable[[StabilityLobes], UsableDepths], tolerance: float
-) -> _Recommended:
-    """Return the cuts that are recommended.
-
-    Zero-order limits only say where to look: half a percent beside a pocket's top another vibration may be the limit, of which they know
-    nothing. Around the best of their pockets the limits are computed anew, so close that the tolerance of the speed is seen.
-    """
-    process, preview = change.process, isinstance(change.method, ZeroOrder)
-    points, pockets = highest_removal(usable, process), lobes.best_speeds(recommended=usable.stable)
-    if not preview:
-        return _Recommended(tuple(points), tuple(pockets), change.method.name)
-    if not change.recommend:
-        return _Recommended((), tuple(replace(pocket, recommended_depth=np.nan) for pocket in pockets), None)
-    between = float(usable.spindle_speed[0]), float(usable.spindle_speed[-1])
-    # zero-order limits that are no source of a recommendation still know where pockets may be
-    tops = [found.spindle_speed for found in points] or [found.spindle_speed for found in pockets]
-    blocks = speeds_around(tops, tolerance, between)
-    if not blocks:
-        return _Recommended((), (), _FITTING.name)
-    try:
-        limits = change.fitting_limits(np.unique(np.concatenate([block.speeds for block in blocks])))
-    except InputError as error:
-        return _Recommended((), (), None, (f"no cut is recommended: {error}",))
-    points.clear()
-    pockets.clear()
-    for block in blocks:
-        own = limits.between(float(block.speeds[0]), float(block.speeds[-1]))
-        depths = usable_of(own).between(*block.tops)
-        points += highest_removal(depths, process, 1)
-        pockets += own.between(*block.tops).best_speeds(1, depths.stable)
-    points.sort(key=lambda point: -(point.depth * point.spindle_speed))
-    pockets.sort(key=lambda pocket: -pocket.limit_depth)
-    return _Recommended(tuple(_apart(points)), tuple(_apart(pockets)), _FITTING.name, limits.warnings)
-
-
-def _apart(found: Sequence[Place], count: int = 3) -> list[Place]:
-    """The first of those that stand close to each other."""
-    kept: list[Place] = []
-    for each in found:
-        if all(abs(each.spindle_speed / other.spindle_speed - 1.0) > AROUND for other in kept):
-            kept.append(each)
-    return kept[:count]
-
-
 def modes_of(tip: Receptance | TipModes, process: MillingProcess) -> TipModes:
     """Return a tip's modes, fitted where they are not known."""
     if isinstance(tip, TipModes):
         return tip
     return fitted_modes(directions_for(process, tip))[0]
-
-
-def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
-    """Limits at the speeds that were asked for, among further ones beside them."""
-    if change.machine.speed_range is None:
-        return change.limits(speeds)
-    # close speeds share the machine at their middle, which those that nobody has asked for shall not move
-    known = np.unique(change.speeds)
-    asked = np.searchsorted(known, speeds * (1.0 - 1e-9)) < np.searchsorted(known, speeds * (1.0 + 1e-9))
-    places = [np.flatnonzero(part) for part in (asked, ~asked) if part.any()]
-    return StabilityLobes.joined([change.limits(speeds[own]) for own in places], places)
 
 
 def classify_tested_cuts(change: ToolChange, cuts: TestedCuts) -> Tally:

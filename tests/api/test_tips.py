@@ -13,7 +13,8 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.io.frf_files import Source, read_frfs, read_tapped_tip
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machining_setup import BareCutter, CutSpec
-from rcsa_ident.workflows.tool_change import ToolChange, advise
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import ToolChange
 from tests.api.identifying import carried
 from tests.api.in_process import refused
 from tests.api.test_listening import text_of_hits

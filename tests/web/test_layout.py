@@ -15,7 +15,8 @@ from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.report.html import ToolCard, tool_cards_html
 from rcsa_ident.units import rpm
-from rcsa_ident.workflows.tool_change import ToolChange, advise
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import ToolChange
 from tests.api.recordings import content, declared
 from tests.fixtures import by_hand
 from tests.fixtures.paths import TOOLINGS

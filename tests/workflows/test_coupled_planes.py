@@ -17,9 +17,10 @@ from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.compare import Place, compare
 from rcsa_ident.workflows.contact import Support, TapTest, tap_model
-from rcsa_ident.workflows.tool_change import ToolChange, advise, map_of, spread_seconds, surface_of, tooltip
+from rcsa_ident.workflows.tool_change import ToolChange, map_of, spread_seconds, surface_of, tooltip
 from tests.fixtures import by_hand, coupled_by_hand
 
 RPM = np.pi / 30.0

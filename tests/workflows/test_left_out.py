@@ -14,7 +14,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.flanges import read_flange_machine
 from rcsa_ident.io.setups import tooling_of
 from rcsa_ident.machining_setup import CutSpec
-from rcsa_ident.workflows.tool_change import ToolChange, advise
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import ToolChange
 from tests.fixtures import by_hand
 
 HALF = CutSpec(Engagement(0.5 * np.pi, np.pi), coefficients={"tangential": 9e8, "radial_ratio": 0.26})

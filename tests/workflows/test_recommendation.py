@@ -18,7 +18,8 @@ from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.result import RESERVE
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.tip_modes import TIP, TipModes
-from rcsa_ident.workflows.tool_change import ToolChange, advise
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import ToolChange
 from tests.fixtures import by_hand
 
 HALF = CutSpec(Engagement(0.5 * np.pi, np.pi), coefficients={"tangential": 9e8, "radial_ratio": 0.26})
@@ -58,11 +59,30 @@ def test_a_preview_recommends_nothing():
     assert asked.seconds > replace(asked, recommend=False).seconds
 
 
-def test_a_method_that_fits_recommends_from_its_own_limits():
-    asked = replace(doubling(method=FullDiscretisation()), speeds=np.linspace(1500.0, 1560.0, 5))
-    found = advise(asked)
-    assert found.recommended_by == "full-discretisation"
-    assert found.recommended[0].depth == found.usable.depth.max()
+def test_one_question_has_one_recommended_cut_whatever_stands_beside_it():
+    asked = replace(doubling(), speeds=np.linspace(1500.0, 1700.0, 21))
+    known = advise(asked)
+    assert known.recommended_by == "full-discretisation"
+    for further in (
+        {"method": FullDiscretisation()},
+        {"method": SemiDiscretisation()},
+        {"planned": [(1555.5, 0.4e-3)], "depth": 1e-3},
+    ):
+        method = further.pop("method", asked.method)
+        found = advise(replace(asked, method=method), **further)
+        assert found.lobes.method == method.name
+        assert [(point.spindle_speed, point.depth, point.held) for point in found.recommended] == [
+            (point.spindle_speed, point.depth, point.held) for point in known.recommended
+        ]
+
+
+def test_a_recommended_depth_follows_from_the_limit_step_by_step():
+    for point in advise(doubling()).recommended:
+        held = point.held
+        assert held.limit == point.limit >= held.within_tolerance
+        assert held.with_probability is None
+        assert point.depth == held.depth == pytest.approx(0.9 * held.within_tolerance, rel=1e-12)
+        assert f"{1e3 * held.within_tolerance:.2f} mm within ±1 % of the speed → {1e3 * point.depth:.2f} mm less 10 %" in str(held)
 
 
 def test_a_cut_that_no_fitting_method_takes_is_not_recommended():

@@ -27,7 +27,8 @@ from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict, tally
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.workflows.tool_change import BEYOND, ToolChange, advise, classify_tested_cuts, map_of, spread_seconds, surface_of, tooltip
+from rcsa_ident.workflows.advise import advise
+from rcsa_ident.workflows.tool_change import BEYOND, ToolChange, classify_tested_cuts, map_of, spread_seconds, surface_of, tooltip
 from tests.fixtures import by_hand
 from tests.machine.planes import BAND, JOINT, oblique
 from tests.stability.written import lobes

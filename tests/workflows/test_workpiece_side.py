@@ -27,9 +27,10 @@ from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
 from rcsa_ident.virtual.workpiece_side import SideMode, VirtualWorkpieceSide
+from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.identify import identify, judge
 from rcsa_ident.workflows.learn_from_cuts import believed_of_machine
-from rcsa_ident.workflows.tool_change import ToolChange, advise, surface_of, tooltip
+from rcsa_ident.workflows.tool_change import ToolChange, surface_of, tooltip
 from tests.fixtures import by_hand
 from tests.fixtures.paths import MACHINES
 

@@ -22,7 +22,7 @@ export function removalPer(tooling, cut, feed) {
  * `parts` are limits of another method, as far as they are known: the lobes themselves are then a preview, drawn as such.
  * `box` is what it is drawn in.
  */
-export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested = [], parts = null }, box) {
+export function lobeFigure(lobes, { maxDepth, removal, recommended = [], around = [], tested = [], parts = null }, box) {
   const times = factor("depth");
   const data = [];
   const tops = [];
@@ -31,26 +31,30 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
     const name = seriesOf(i);
     const ink = colour(name);
     const x = each.spindle_speed_rpm;
+    const preview = parts !== null || each.method === "zero-order";
     // null is stable up to the depth that was asked for: drawn at that depth
     const shown = (values) => values.map((v) => (v ?? maxDepth) * times);
     const y = shown(each.limit_depth_mm);
     highest = Math.max(highest, ...y);
-    if (each.limit_depth_low_mm && !parts) {
-      const common = { x, mode: "lines", line: { width: 0 }, hoverinfo: "skip", type: "scatter" };
-      data.push({ ...common, y: shown(each.limit_depth_low_mm) });
-      data.push({ ...common, y: shown(each.limit_depth_high_mm), fill: "tonexty", fillcolor: colour(name, 0.28) });
-      highest = Math.max(highest, ...shown(each.limit_depth_high_mm).map((v) => Math.min(v, maxDepth * times)));
-    }
+    const band = (limits) => {
+      if (!limits.limit_depth_low_mm) return;
+      const common = { x: limits.spindle_speed_rpm, mode: "lines", line: { width: 0 }, hoverinfo: "skip", type: "scatter" };
+      data.push({ ...common, y: shown(limits.limit_depth_low_mm) });
+      data.push({ ...common, y: shown(limits.limit_depth_high_mm), fill: "tonexty", fillcolor: colour(name, 0.28) });
+      highest = Math.max(highest, ...shown(limits.limit_depth_high_mm).map((v) => Math.min(v, maxDepth * times)));
+    };
+    if (!parts) band(each);
     const told = x.map((rpm, k) => {
       const depth = each.limit_depth_mm[k];
       const low = each.limit_depth_low_mm?.[k] ?? null;
-      const band = each.limit_depth_low_mm && low !== null ? ` (95 %: ${text("depth", low)})` : "";
-      const limit = depth === null ? `limit above ${text("depth", maxDepth)}` : `limit ${text("depth", depth)}${band}`;
+      const sure = each.limit_depth_low_mm && low !== null ? ` (95 %: ${text("depth", low)})` : "";
+      const by = preview ? "preview: " : "";
+      const limit = depth === null ? `${by}limit above ${text("depth", maxDepth)}` : `${by}limit ${text("depth", depth)}${sure}`;
       const deep = each.recommended_depth_mm[k];
       const rate = removal[i] && deep !== null ? ` · ${text("removal", removal[i] * rpm * deep)}` : "";
       const chatter = each.chatter_frequency_hz[k];
-      const advised = deep === null ? "no depth recommended" : `recommended ${text("depth", deep)}`;
-      return `${limit} · ${advised}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
+      const advised = deep === null ? "" : ` · recommended ${text("depth", deep)}`;
+      return `${limit}${advised}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
     });
     data.push({
       x,
@@ -59,8 +63,8 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       text: told,
       type: "scatter",
       mode: "lines",
-      line: parts ? { color: ink, width: 1.2, dash: "dot" } : { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
-      fill: lobes.length === 1 && !parts ? "tozeroy" : "none",
+      line: preview ? { color: ink, width: 1.2, dash: "dot" } : { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
+      fill: lobes.length === 1 && !preview ? "tozeroy" : "none",
       fillcolor: colour(name, 0.07),
       hovertemplate: lobes.length === 1 ? "%{text}<extra></extra>" : "%{text}",
     });
@@ -81,7 +85,15 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       data.push({ ...common, y: shown(part.limit_depth_mm), mode: "lines+markers", line, marker: { color: ink, size: 5 } });
       highest = Math.max(highest, ...shown(part.limit_depth_mm));
     }
-    const best = parts ? [] : each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
+    for (const limits of parts ? [] : (around[i] ?? [])) {
+      // beside lobes of a method of their own they would be drawn twice
+      if (!preview) continue;
+      band(limits);
+      const y = shown(limits.limit_depth_mm);
+      highest = Math.max(highest, ...y);
+      data.push({ x: limits.spindle_speed_rpm, y, type: "scatter", mode: "lines", line: { color: ink, width: 2.6 }, hoverinfo: "skip" });
+    }
+    const best = preview ? [] : each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
     data.push({
       x: best.map((b) => b.spindle_speed_rpm),
       y: best.map((b) => (b.limit_depth_mm ?? maxDepth) * times),
@@ -101,6 +113,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
         hoverinfo: "skip",
       });
     }
+    if (preview && cut) tops.push({ rpm: cut.spindle_speed_rpm, depth: (cut.limit_depth_mm ?? maxDepth) * times, ink, k: 0 });
     best.forEach((b, k) => tops.push({ rpm: b.spindle_speed_rpm, depth: (b.limit_depth_mm ?? maxDepth) * times, ink, k }));
   });
   for (const [verdict, [symbol, , ink]] of Object.entries(MARKS)) {
@@ -133,10 +146,10 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
     yaxis: axis(`Axial depth [${unit("depth")}]`, { domain: [UPPER, 1], range: [0, top], fixedrange: false }),
     yaxis2: axis("Chatter [Hz]", { domain: [0, 0.25], rangemode: "normal", nticks: 4 }),
   };
-  const words = lobes.map((l) => {
-    const best = l.best_speeds[0];
+  const words = lobes.map((l, i) => {
+    const best = l.method === "zero-order" ? recommended[i] : l.best_speeds[0];
     return best
-      ? `${l.tooling}: highest stability limit at ${plain(best.spindle_speed_rpm)} rev/min, ${text("depth", best.limit_depth_mm ?? maxDepth)}`
+      ? `${l.tooling}: stability limit at ${plain(best.spindle_speed_rpm)} rev/min, ${text("depth", best.limit_depth_mm ?? maxDepth)}`
       : l.tooling;
   });
   return { data, layout, say: `Stability lobes. ${words.join("; ")}.` };

@@ -6,6 +6,7 @@ import { QUICK } from "./change_question.js";
 
 /**
  * The answers of a question, each better than the one before: {lobes, advice, tips}, and `coming` where a job computes the lobes.
+ * `advice` has the recommended cuts, whichever method the lobes are of.
  * `heard.told(job)` and `heard.part(partial)` follow that job.
  */
 export async function* answers({ lobes: question, tips, advice }, signal, heard) {
@@ -16,11 +17,12 @@ export async function* answers({ lobes: question, tips, advice }, signal, heard)
   ]);
   const coming = question.method === QUICK ? null : question.method;
   yield { lobes, advice: null, tips: shown, coming };
-  if (coming) {
-    const found = await followLobes(question, signal, heard);
-    if (found) yield { lobes: found.toolings, advice: null, tips: shown, coming: null };
-  } else if (advice) yield { lobes, advice: (await post("advice", advice, { signal })).toolings, tips: shown, coming };
-  else yield { lobes: (await post("lobes", question, { signal })).toolings, advice: null, tips: shown, coming };
+  const told = (await (advice ? post("advice", advice, { signal }) : post("lobes", { ...question, method: QUICK }, { signal }))).toolings;
+  const tried = advice || coming ? lobes : told;
+  yield { lobes: tried, advice: told, tips: shown, coming };
+  if (!coming) return;
+  const found = await followLobes({ ...question, recommend: false }, signal, heard);
+  if (found) yield { lobes: found.toolings, advice: told, tips: shown, coming: null };
 }
 
 /** What is going on, above the answers: that they are those of the question before, or how far a job is, for how long, and a way to end it. */

@@ -61,7 +61,8 @@ export function bodyOf(on, names, fields, { stock, strategy, direction, method, 
   if (material) cut.material = material;
   const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
   const lobes = { ...on, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
-  const advice = value("fz") === null || method !== QUICK ? null : { ...lobes };
+  // the recommended cut does not depend on the method of the lobes beside it
+  const advice = value("fz") === null ? null : { ...lobes, method: QUICK };
   if (advice && value("power") !== null) advice.max_power_kw = value("power");
   if (advice && value("torque") !== null) advice.max_torque_nm = value("torque");
   if (tested.length) lobes.tested = tested;

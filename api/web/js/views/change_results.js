@@ -4,7 +4,7 @@ import { add, card, fill, h, note, table, whisper } from "../dom.js";
 import { removalPer } from "../figures.js";
 import { q, u } from "../units.js";
 import { frfCard } from "./frf_card.js";
-import { headline, limitOf, recommended, reserve } from "./headline.js";
+import { headline, heldBack, limitOf, recommended } from "./headline.js";
 import { lobesCard } from "./lobes_card.js";
 
 /** Show an answer; `part(partial)` of what is returned shows limits of a better one that are known already. */
@@ -82,7 +82,7 @@ function comparison(found, summaries, question) {
     limit("Stability limit", (r) => r.best),
     column("Removes", "removal", (r) => r.best?.removal_rate_cm3_per_min),
   ];
-  const box = card("Side by side", null, table("Toolings side by side", columns, rows), reserve(found, question));
+  const box = card("Side by side", null, table("Toolings side by side", columns, rows), rows.length ? heldBack(rows[0].best) : null);
   box.classList.add("wide");
   return box;
 }

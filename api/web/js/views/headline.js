@@ -4,18 +4,21 @@ import { fill, h } from "../dom.js";
 import { libraryDrawing } from "../drawing.js";
 import { plain, q, text } from "../units.js";
 import { cardLink } from "./card_link.js";
+import { QUICK } from "./change_question.js";
+
+const told = (found, i) => found.advice?.[i] ?? found.lobes[i];
 
 /** The recommended cuts of a tooling: within power and torque where these were asked for. */
-export const recommended = (found, i) => found.advice?.[i]?.highest_removal ?? found.lobes[i].recommended;
+export const recommended = (found, i) => told(found, i).highest_removal ?? told(found, i).recommended;
+
+/** Limits around the recommended cuts, by the method that computed them. */
+export const around = (found, i) => told(found, i).around;
+
+/** Whether lobes only say where to look. */
+export const isPreview = (lobes) => lobes.method === QUICK;
 
 /** Whether a tooling's recommended cuts are not computed yet. */
-const isPreview = (found, i) => !found.advice && found.lobes[i].recommended_by === null;
-
-/** The method that computed the recommended cuts, where it is another one than that of the lobes. */
-const computedBy = (found) => {
-  const by = found.advice?.[0]?.recommended_by ?? found.lobes[0].recommended_by;
-  return by === null || by === found.lobes[0].method ? "" : ` It was computed by ${by}; the lobes are those of ${found.lobes[0].method}.`;
-};
+const isComing = (found, i) => !found.advice && found.lobes[i].recommended_by === null;
 
 /** What to set, said first: a speed, a depth, and why. */
 export function headline(found, question) {
@@ -25,7 +28,7 @@ export function headline(found, question) {
     // a tip's cutter is in no library
     const drawing = question.tip?.cutter ? null : h("div", { class: "mini" }, libraryDrawing(lobes.tooling, { brief: true }));
     const key = h("span", { class: `key line ${SERIES[i % SERIES.length]}`, "aria-hidden": "true" });
-    if (!best && isPreview(found, i)) {
+    if (!best && isComing(found, i)) {
       return h(
         "article",
         { class: "best", "aria-busy": "true" },
@@ -37,7 +40,8 @@ export function headline(found, question) {
     if (!best) {
       const limit = lobes.absolute_limit_mm;
       const below = limit === null ? "" : ` Stable below ${text("depth", limit)} everywhere.`;
-      const why = lobes.withheld ? `No cut is recommended: ${lobes.withheld}.` : `No cut is recommended at these speeds.${below}`;
+      const refused = told(found, i).warnings.find((each) => each.startsWith("no cut is recommended"));
+      const why = refused ? `${refused}.` : lobes.withheld ? `No cut is recommended: ${lobes.withheld}.` : `No cut is recommended at these speeds.${below}`;
       return h(
         "article",
         { class: "best" },
@@ -58,13 +62,13 @@ export function headline(found, question) {
           ? null
           : h("span", { class: "figure" }, h("span", { class: "of" }, "recommended depth "), q("depth", best.recommended_depth_mm)),
       ),
-      best.recommended_depth_mm === null ? unlimited(question) : null,
+      best.recommended_depth_mm === null ? unlimited(best, question) : null,
       h(
         "p",
         null,
         "stability limit ",
         limitOf(best, question),
-        best.bound === undefined || best.recommended_depth_mm === null
+        best.removal_rate_cm3_per_min === null
           ? null
           : [
               " · ",
@@ -91,8 +95,8 @@ export function headline(found, question) {
             ]),
           )
         : null,
+      heldBack(best),
       bandOf(found, i),
-      cards === 1 ? reserve(found, question, lobes.recommended_by === null ? null : lobes.best_speeds[0]) : null,
       drawing,
       question.tip ? null : cardLink(lobes.tooling),
     );
@@ -102,7 +106,7 @@ export function headline(found, question) {
 
 /** What dominates the band of the recommended cut's limit, and what would narrow it. */
 const bandOf = (found, i) => {
-  const words = (found.advice?.[i] ?? found.lobes[i]).band?.in_words;
+  const words = told(found, i).band?.in_words;
   return words ? h("p", { class: "dominates" }, `${words}.`) : null;
 };
 
@@ -117,23 +121,35 @@ export const limitOf = (cut, question, options) =>
   cut.limit_depth_mm === null ? ["above ", q("depth", question.max_depth_mm, options)] : q("depth", cut.limit_depth_mm, options);
 
 /** What is said in place of a depth: how deep limits were looked for tells nothing of how deep one may cut. */
-const unlimited = (question) =>
+const unlimited = (cut, question) =>
   h(
     "p",
     { class: "unlimited" },
-    "Nothing up to ",
-    q("depth", question.max_depth_mm),
-    " limits this cut, so no depth is recommended. Ask for a deeper cut to see where its limit lies.",
+    cut.why
+      ? `${cut.why[0].toUpperCase()}${cut.why.slice(1)}.`
+      : [
+          "Nothing up to ",
+          q("depth", question.max_depth_mm),
+          " limits this cut, so no depth is recommended. Ask for a deeper cut to see where its limit lies.",
+        ],
   );
 
-/** How sure the recommendation is, and what it stays away from. */
-export function reserve(found, question, pocket = null) {
-  const banded = found.lobes.some((each) => each.limit_depth_low_mm);
+/** How the recommended depth follows from the stability limit, step by step. */
+export function heldBack(cut) {
+  const steps = cut?.held_back;
+  if (!steps || cut.limit_depth_mm === null) return null;
+  const chain = [
+    ["stability limit ", q("depth", cut.limit_depth_mm)],
+    [q("depth", steps.within_tolerance_mm), ` within ±${plain(steps.tolerance_percent, 1)} % of the speed`],
+    steps.with_probability_mm === null ? null : [q("depth", steps.with_probability_mm), ` with a probability of ${plain(steps.probability_percent, 1)} %`],
+    [q("depth", steps.less_reserve_mm), ` less ${plain(steps.reserve_percent, 1)} %`],
+  ].filter(Boolean);
   return h(
     "p",
-    { class: "soft small reserve" },
-    `The recommended depth is 10 % below the stability limit${banded ? " that holds with a probability of 95 %" : ""}, with the speed right within 1 %.${computedBy(found)}`,
-    pocket ? [` Highest stability limit: ${plain(pocket.spindle_speed_rpm)} rev/min, `, limitOf(pocket, question), "."] : null,
+    { class: "soft small held-back" },
+    `At ${plain(cut.spindle_speed_rpm)} rev/min: `,
+    chain.map((each, k) => [k ? " → " : "", each]),
+    ".",
   );
 }
 
@@ -143,4 +159,5 @@ const bounds = (bound) =>
     power: "limited by the spindle's power",
     torque: "limited by the spindle's torque",
     speed: "limited by the highest speed",
+    depth: "limited by nothing that was looked for",
   })[bound] ?? bound;

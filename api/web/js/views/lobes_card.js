@@ -5,7 +5,11 @@ import { lobeFigure } from "../figures.js";
 import { failed, quantity } from "../forms.js";
 import { testedCuts, testedLegend, toldRight } from "../tested.js";
 import { plain, q } from "../units.js";
-import { limitOf, recommended } from "./headline.js";
+import { around, isPreview, limitOf, recommended } from "./headline.js";
+
+/** Limits that hold at a speed: those around a recommended cut where there are some, else the lobes. */
+const holding = (found, i, rpm) =>
+  (around(found, i) ?? []).find((each) => each.spindle_speed_rpm[0] <= rpm && rpm <= each.spindle_speed_rpm.at(-1)) ?? found.lobes[i];
 
 function at(lobes, rpm) {
   const speeds = lobes.spindle_speed_rpm;
@@ -25,7 +29,8 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
   const draw = () =>
     picture.draw((box) => {
       const best = found.lobes.map((_, i) => recommended(found, i)[0]);
-      const shown = { maxDepth: question.max_depth_mm, removal, recommended: best, tested: tested.cuts };
+      const close = found.lobes.map((_, i) => around(found, i) ?? []);
+      const shown = { maxDepth: question.max_depth_mm, removal, recommended: best, around: close, tested: tested.cuts };
       return lobeFigure(found.lobes, { ...shown, parts: found.coming ? parts : null }, box);
     });
   draw();
@@ -39,26 +44,28 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
       read,
       !Number.isFinite(rpm) || rpm === null
         ? h("li", { class: "soft" }, "Write a speed.")
-        : found.lobes.map((lobes, i) => {
+        : found.lobes.map(({ tooling }, i) => {
+            const lobes = holding(found, i, rpm);
+            const preview = isPreview(lobes);
             const k = at(lobes, rpm);
             const depth = lobes.limit_depth_mm[k];
             const low = lobes.limit_depth_low_mm?.[k];
             const high = lobes.limit_depth_high_mm?.[k];
             const chatter = lobes.chatter_frequency_hz[k];
-            const deep = lobes.recommended_depth_mm[k];
+            const deep = lobes.recommended_depth_mm?.[k] ?? null;
             return h(
               "li",
               null,
-              several(found) ? h("strong", null, `${lobes.tooling}: `) : null,
-              "stability limit ",
+              several(found) ? h("strong", null, `${tooling}: `) : null,
+              preview ? "stability limit by a preview " : "stability limit ",
               limitOf({ limit_depth_mm: depth }, question),
               low !== undefined && low !== null && high
                 ? [" (95 %: ", q("depth", low, { bare: true }), " to ", q("depth", high), ")"]
                 : null,
-              deep === null ? ", no depth recommended" : [`, recommended depth ${lobes.recommended_by === lobes.method ? "" : "by this preview "}`, q("depth", deep)],
+              deep === null ? null : [", recommended depth ", q("depth", deep)],
               removal[i] && deep !== null ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * deep)] : null,
               chatter === null ? null : ` · beyond the limit chatter at ${plain(chatter)} Hz`,
-              lobes.flip[k] ? " · period doubling" : null,
+              lobes.flip?.[k] ? " · period doubling" : null,
             );
           }),
     );
@@ -76,10 +83,16 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
   );
   const { choose, beside, fault } = testedParts(found.lobes, tested, ontested);
   const method = found.coming ?? first.method;
+  const by = found.advice?.[0]?.recommended_by;
   const lines = several(found) ? found.lobes.map((l, i) => ({ name: l.tooling, series: SERIES[i % SERIES.length] })) : [];
   if (found.coming) {
     const series = several(found) ? "s6" : SERIES[0];
     lines.push({ name: `${found.coming}, as far as it is known`, series }, { name: `preview by ${first.method}`, series, dash: "dot" });
+  }
+  else if (isPreview(first)) {
+    const series = several(found) ? "s6" : SERIES[0];
+    if (by) lines.push({ name: `stability limit by ${by}, with its 95 % band where machines are uncertain`, series });
+    lines.push({ name: `preview by ${first.method}: where to look`, series, dash: "dot" });
   }
   const box = card(
     method === "zero-order" ? "Stability lobes" : `Stability lobes, ${method}`,
@@ -92,7 +105,7 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
       "p",
       { class: "small soft" },
       "The line is the stability limit. Shaded around it: where it lies with a probability of 95 %. Diamonds: the highest ",
-      "limits. Dot: the recommended cut. Hover for limit, recommended depth and chatter frequency; drag to look closer, double click to come back.",
+      "limits. Dot: the recommended cut. Hover for limit and chatter frequency; drag to look closer, double click to come back.",
     ),
     h("div", { class: "reader" }, speed, read),
   );

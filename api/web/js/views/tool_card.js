@@ -7,7 +7,7 @@ import { followLobes } from "../jobs.js";
 import { to } from "../router.js";
 import { plain, q, u } from "../units.js";
 import { bodyOf, NUMBERS, QUICK, runoutOf } from "./change_question.js";
-import { limitOf } from "./headline.js";
+import { heldBack, limitOf } from "./headline.js";
 
 export async function view(_args, query, place) {
   const [name, id] = [query.get("tooling") ?? "", query.get("machine") ?? ""];
@@ -75,6 +75,7 @@ function sheet({ name, machine, keys, question, found, software, versions }) {
     h("div", { class: "picture" }, libraryDrawing(name)),
     h("h2", null, "Recommended cuts"),
     found.cuts.length ? cutsTable(found.cuts, keys, question) : note("doubt", found.withheld ?? "No cut is recommended at these speeds."),
+    heldBack(found.cuts.find((cut) => cut.held_back)),
     h(
       "p",
       { class: "small" },
