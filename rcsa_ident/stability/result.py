@@ -168,7 +168,7 @@ class StabilityLobes(Drawn):
         >>> bool((lobes.limit_quantile(0.95) < lobes.limit_depth).all())
         True
         """
-        return self.nominal if self.drawn is None else _held_by(np.minimum(self.drawn, self.max_depth), probability)
+        return _held_by(np.minimum(self.limit_depth[None] if self.drawn is None else self.drawn, self.max_depth), probability)
 
     def probability(self, place: int, depth: float) -> float | None:
         """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them.

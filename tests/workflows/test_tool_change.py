@@ -19,6 +19,7 @@ from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.machine.speed_dependence import BLOCK, tips_over_speed
 from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.stability.drawn_modes import of_draw
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DRAWS, both_directions, drawn_limits, stability_lobes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
@@ -176,30 +177,24 @@ def test_limits_of_a_machine_are_those_of_its_tips(shop):
 
 
 @pytest.mark.slow
-def test_another_method_keeps_the_proportion_of_its_draws(shop):
-    asked = replace(shop, speeds=shop.speeds[::5], draws=20)
-    fine = replace(asked, method=FullDiscretisation())
-    # on the same receptances: methods that fit modes look beyond the band
-    quick = ToolChange(_Wider(asked.machine), asked.tooling, asked.cut, asked.speeds, asked.max_depth, draws=20).limits()
-    marched = fine.limits()
-    np.testing.assert_allclose(marched.drawn / marched.nominal, quick.drawn / quick.nominal, rtol=1e-9)
-    assert np.max(np.abs(marched.nominal / quick.nominal - 1.0)) > 1e-3
-    assert any("scaled from the zero-order" in warning for warning in marched.warnings)
+def test_another_method_has_draws_of_its_own_on_the_same_machines(shop):
+    fine = replace(shop, speeds=shop.speeds[::5], draws=3, method=FullDiscretisation())
+    marched, known = fine.limits(), fine.process.coefficients
+    factors = np.exp(np.random.default_rng([1, 1]).standard_normal((3, 2)) * (known.tangential_spread, known.ratio_spread))
+    processes = of_draw(fine.process, factors, 3)
+    for places, tip in fine.tips(fine.speeds, spread=True):
+        nodes = tip.thinned()
+        drawn = both_directions(nodes).rows
+        for limits, values, process in zip(marched.drawn, nodes.drawn(3, np.random.default_rng(1)), processes, strict=True):
+            alone = stability_lobes(Receptance(nodes.omega, values, drawn, drawn), process, fine.speeds[places], 0.02, fine.method)
+            np.testing.assert_allclose(limits[places], alone.limit_depth, rtol=5e-3)
+    # in the proportion of the zero-order limits they would be beside that
+    ratio = (marched.drawn / marched.nominal) / (
+        replace(shop, speeds=fine.speeds, draws=3).limits().drawn / shop.limits(fine.speeds, draws=0).nominal
+    )
+    assert np.max(np.abs(ratio - 1.0)) > 0.05
     assert any("replaced by a fit with" in warning for warning in marched.warnings)
     assert set(marched.warnings) <= set(fine.remarks(marched))
-
-
-class _Wider:
-    """A machine whose every receptance reaches as far as one that modes are fitted to."""
-
-    def __init__(self, machine):
-        self.machine = machine
-
-    def __getattr__(self, name):
-        return getattr(self.machine, name)
-
-    def lines(self, beyond=1.0):
-        return self.machine.lines(BEYOND * beyond)
 
 
 def test_a_fit_stands_for_the_receptance(shop):
