@@ -34,13 +34,13 @@ def write_lobes(
     recommended : array, shape (n,) [m], optional
         Recommended depths; by default those of the lobes alone, which look no further than their own speeds.
     preview : bool
-        Whether the limits only say where to look: then neither a band nor recommended depths are written.
+        Whether the limits only say where to look: then no band is written, and the column of recommended depths is empty.
     """
     band, extra = lobes.band, dict[str, FloatArray]()
     if band is not None and not preview:
         extra = {"limit_depth_low_mm": band[0] * 1e3, "limit_depth_high_mm": band[1] * 1e3}
-    if not preview:
-        extra["recommended_depth_mm"] = (lobes.recommended_depth() if recommended is None else recommended) * 1e3
+    depth = np.full(lobes.spindle_speed.shape, np.nan) if preview else lobes.recommended_depth() if recommended is None else recommended
+    extra["recommended_depth_mm"] = depth * 1e3
     extra["flip"] = np.where(lobes.stable, np.nan, lobes.flip.astype(float))
     if surface is not None:
         extra |= {"surface_error_um": surface.largest * 1e6, "surface_error_mean_um": surface.mean * 1e6}

@@ -97,7 +97,7 @@ def advise(
     if asked.recommend:
         # nothing of the recommendation hangs on what else is asked
         same = isinstance(asked.method, ZeroOrder) and not planned and depth is None
-        found = _recommended(asked, wide if same else None, usable_of, shares)
+        found = _recommended(asked, wide if same else _preview(asked, tolerance, wide), usable_of, shares)
     else:
         pockets = lobes.best_speeds(recommended=usable.stable)
         found = _Recommended(pockets=tuple(replace(pocket, recommended_depth=np.nan) for pocket in pockets))
@@ -139,6 +139,14 @@ def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
     return StabilityLobes.joined([change.limits(speeds[own]) for own in places], places)
 
 
+def _preview(change: ToolChange, tolerance: float, known: StabilityLobes) -> StabilityLobes:
+    """Zero-order limits, which say where to look; those that are known where that method does not take the cut, as at a varying speed."""
+    try:
+        return _limits_beside(replace(change, method=ZeroOrder()), pad_speeds(change.speeds, tolerance))
+    except InputError:
+        return known
+
+
 def _judged(change: ToolChange, speeds: Sequence[float], tolerance: float) -> dict[float, StabilityLobes]:
     """Limits around the speeds of planned cuts by the method that fits them; none where it does not take the cut."""
     near = {speed: speed * np.linspace(1.0 - tolerance, 1.0 + tolerance, 5 if tolerance > 0.0 else 1) for speed in speeds}
@@ -163,7 +171,7 @@ class _Recommended:
 
 
 def _recommended(
-    change: ToolChange, preview: StabilityLobes | None, usable_of: Callable[[StabilityLobes], UsableDepths], shares: _Shares
+    change: ToolChange, preview: StabilityLobes, usable_of: Callable[[StabilityLobes], UsableDepths], shares: _Shares
 ) -> _Recommended:
     """Return the cuts that are recommended.
 
@@ -171,8 +179,6 @@ def _recommended(
     nothing. Around the best of their pockets the limits are computed anew, so close that the tolerance of the speed is seen.
     """
     low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
-    if preview is None:
-        preview = _limits_beside(replace(change, method=ZeroOrder()), pad_speeds(change.speeds, shares.tolerance))
     usable = usable_of(preview).between(low, high)
     # zero-order limits that are no source of a recommendation still know where pockets may be
     tops = [found.spindle_speed for found in highest_removal(usable, change.process)]
