@@ -98,9 +98,10 @@ def identify(
     Examples
     --------
     >>> import rcsa_ident as ri
-    >>> found = ri.identify("sample_runs", seed=1)
+    >>> campaign = ri.sample_campaign("sample_runs")
+    >>> found = ri.identify(campaign, seed=1)
     >>> print(found)
-    converged, 20 cuts, X 7 modes, Y 8 modes
+    converged, 24 cuts, X 7 modes, Y 8 modes
     >>> print(found.save("RESULT.json"))
     RESULT.json
     """
