@@ -28,6 +28,7 @@ PAGES = (
     "docs/tutorial/ten_minutes.md",
     "docs/tutorial/machine.md",
     "docs/tutorial/never_cut.md",
+    "docs/tutorial/forces.md",
     "docs/howto/tap_tests.md",
     "docs/howto/robots.md",
 )
@@ -199,6 +200,7 @@ def write(name: str, run: Run) -> Iterator[Difference]:
     (ROOT / name).write_text("\n".join(lines) + "\n", "utf-8")
     for figure, made in FIGURES.get(name, {}).items():
         shutil.copy(run.folder / made, (ROOT / name).parent / figure)
+        lighten((ROOT / name).parent / figure)
     if name == "README.md":
         picture(run.folder / "report" / "report.html", ROOT / "docs" / "never_cut.png")
 
@@ -218,6 +220,15 @@ def picture(report: Path, out: Path, tooling: str = "S4-shrink") -> None:
         right, bottom = max(box["x"] + box["width"] for box in boxes if box), max(box["y"] + box["height"] for box in boxes if box)
         page.screenshot(path=out, full_page=True, clip={"x": left, "y": top, "width": right - left, "height": bottom - top})
         browser.close()
+    lighten(out)
+
+
+def lighten(figure: Path) -> None:
+    """Keep 128 colours of a picture, as many as a page or a diagram has: a third of the bytes."""
+    if figure.suffix == ".png":
+        from PIL import Image
+
+        Image.open(figure).convert("RGB").quantize(128).save(figure, optimize=True)
 
 
 def main(arguments: Sequence[str]) -> None:
