@@ -1,9 +1,9 @@
 """``python -m benchmarks page_outputs [--write] [PAGE …]``: what the pages' commands and scripts print, beside what the pages say.
 
-A fenced ``text`` block below a ``sh`` or ``python`` block is its output. Lines of a page that are ``…`` stand for any number of lines, a ``…``
-within a line for any characters. Words have to be equal, and numbers to one of their last digit; or within N % where ``<!-- within N % -->``
-stands above, as of an identification, whose last digits are the processor's. Times, and how many modes a search has kept, are not compared. ``--write`` puts what
-was printed into the pages, and makes their figures anew.
+A fenced ``text`` block below a ``sh`` or ``python`` block is its output. Lines of a page that are ``…`` stand for any number of lines, a
+``…`` within a line for any characters. Words have to be equal, and numbers to one of their last digit; or within N % where
+``<!-- within N % -->`` stands above, as of an identification, whose last digits are the processor's. Times, and how many modes a search
+has kept, are not compared. ``--write`` puts what was printed into the pages, and makes their figures anew.
 
 Commands of all pages run in one folder that holds the project's data, each once.
 """
@@ -82,7 +82,8 @@ class Run:
 
     def shell(self, text: str) -> str:
         """Return what a block of commands prints."""
-        text = "\n".join(re.sub(r"^.*&& \.venv/bin/(rcsa-ident .*)$", r"\1", line) for line in text.splitlines() if " -m pytest" not in line)
+        lines = [re.sub(r"^.*&& \.venv/bin/(rcsa-ident .*)$", r"\1", line) for line in text.splitlines()]
+        text = "\n".join(line for line in lines if " -m pytest" not in line)
         if text not in self.printed:
             path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
             environment = os.environ | {"PATH": path, "COLUMNS": "82", "NO_COLOR": "1"}

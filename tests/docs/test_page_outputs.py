@@ -56,3 +56,26 @@ def test_lines_are_compared(told, printed, agree):
 def test_a_page_says_how_near_its_numbers_are():
     one, other = blocks("<!-- within 2 % -->\n```text\n100\n```\n```text\n100\n```\n")
     assert (one.within, other.within) == (0.02, 0.0)
+
+
+#: What README and the tutorial say of accuracy, and how the page puts it that has the command beside it.
+REPEATED = [
+    ("README.md", "0.28 % in a similar holder and 0.43 % in another one; 27 of 30", "study.md", "0.0028 and 0.0043 after; 27 of 30 good"),
+    ("README.md", "0.28 % in a similar holder and 0.43 % in another one; 27 of 30", "limits.md", "median 0.0028 / 0.0043, 27 of 30 good"),
+    ("README.md", "median 12 % and 28 %; then 3.2 % and 4.7 %", "limits.md", "median 0.033 / 0.123 / 0.279"),
+    ("README.md", "median 12 % and 28 %; then 3.2 % and 4.7 %", "limits.md", "median 0.032 / 0.047"),
+    ("README.md", "| median relative error 0.4 %, largest 3.6 %", "limits.md", "144 speeds | 0.4 % in the median, 3.6 % at worst"),
+    ("README.md", "168 of 169; 179 of 192", "limits.md", "| 168 of 169 hold"),
+    ("README.md", "168 of 169; 179 of 192", "limits.md", "| 179 of 192 hold"),
+    ("README.md", "1058 Hz and 0.642 µm/N; measured 1056 Hz and 0.678", "limits.md", "1058 Hz, 0.642 µm/N for 1056 Hz, 0.678"),
+    ("docs/tutorial/never_cut.md", "is 0.28 % in a holder like one that cut, and 0.43 % in", "study.md", "0.0028 and 0.0043 after"),
+    ("docs/limits.md", "before any label, 86 % after forty", "labelled_cuts.md", "| after the 40 training cuts | 101 (85.6 %)"),
+    ("docs/physics/recommendation.md", "85.6 % told right after 40", "labelled_cuts.md", "| after the 40 training cuts | 101 (85.6 %)"),
+    ("docs/validation.md", "| 83.1 | 85.593 |", "labelled_cuts.md", "| after the 40 training cuts | 101 (85.6 %)"),
+]
+
+
+@pytest.mark.parametrize(("page", "told", "source", "measured"), REPEATED)
+def test_figures_are_those_of_the_page_that_measures_them(page, told, source, measured):
+    assert told in (ROOT / page).read_text(encoding="utf-8")
+    assert measured in (ROOT / "docs" / source).read_text(encoding="utf-8")
