@@ -21,6 +21,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.fixtures.pictures import lighten
+
 ROOT = Path(__file__).resolve().parent.parent
 #: In this order: later ones use files of the ones before.
 PAGES = (
@@ -222,14 +224,6 @@ def picture(report: Path, out: Path, tooling: str = "S4-shrink") -> None:
         page.screenshot(path=out, full_page=True, clip={"x": left, "y": top, "width": right - left, "height": bottom - top})
         browser.close()
     lighten(out)
-
-
-def lighten(figure: Path) -> None:
-    """Keep 128 colours of a picture, as many as a page or a diagram has: a third of the bytes."""
-    if figure.suffix == ".png":
-        from PIL import Image
-
-        Image.open(figure).convert("RGB").quantize(128).save(figure, optimize=True)
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -12,11 +12,11 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from PIL import Image
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from api.client import Client
 from tests.fixtures.paths import ROOT
+from tests.fixtures.pictures import lighten
 from tests.fixtures.service import serving
 from tests.web.conftest import CHROMIUM, QUIET, drop
 from tests.web.shots import settled
@@ -86,8 +86,7 @@ def pictured(browser: Browser, page: Page, client: Client, identification: str, 
     settled(page)
     page.screenshot(path=folder / "tip.png")
     for path in (folder / f"{name}.png" for name in ("tool_change", "identification", "verdicts", "phone", "robot", "tip")):
-        # a page has few colours: a third of the bytes
-        Image.open(path).convert("RGB").quantize(128).save(path, optimize=True)
+        lighten(path)
 
 
 def main(folder: Path) -> None:
