@@ -70,6 +70,7 @@ STUDIES = (
     "format_examples",
     "fuzz",
     "first_reader",
+    "page_outputs",
     "fuzz_api",
     "mutation",
     "physics_pictures",

@@ -43,9 +43,9 @@ class Result(Drawn):
     >>> import rcsa_ident as ri
     >>> found = ri.read_result("RESULT.json")
     >>> print(found)
-    converged, 20 cuts, X 7 modes, Y 8 modes
+    converged, 24 cuts, X 7 modes, Y 8 modes
     >>> print(found.modes[ri.Dof.X])
-    flange.x, flange.x': 7 modes at 202, 997, 1805, 2310, 2382, 3039, 3937 Hz
+    flange.x, flange.x': 7 modes at 198, 997, 1582, 1808, 2317, 3969, 5561 Hz
     >>> len(found.left_out)
     0
     """

@@ -98,9 +98,10 @@ def identify(
     Examples
     --------
     >>> import rcsa_ident as ri
-    >>> found = ri.identify("sample_runs", seed=1)
+    >>> campaign = ri.sample_campaign("sample_runs")
+    >>> found = ri.identify(campaign, seed=1)
     >>> print(found)
-    converged, 20 cuts, X 7 modes, Y 8 modes
+    converged, 24 cuts, X 7 modes, Y 8 modes
     >>> print(found.save("RESULT.json"))
     RESULT.json
     """
@@ -281,7 +282,7 @@ def advise(
     >>> import rcsa_ident as ri
     >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
     >>> print(ri.advise(machine, tool, ri.CutSpec(feed_per_tooth=0.1e-3), ri.rpm(8000, 16_000, 100)))
-    S3-PG25-long: 14456 rev/min: stability limit 1.93 mm, recommended 1.55 mm, 54 cm³/min, 0.81 kW
+    S3-PG25-long: 14456 rev/min: stability limit 1.94 mm, recommended 1.57 mm, 54 cm³/min, 0.82 kW
     """
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.identified import Result
@@ -328,7 +329,7 @@ def estimate_forces(
     >>> import rcsa_ident as ri
     >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
     >>> print(ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15]))
-    X 6.62 N rms (± 2.9 N), Y 12.7 N rms (± 3.9 N) over 0.22 s, 14182 rev/min, 373 to 4266 Hz
+    X 6.66 N rms (± 3.1 N), Y 12.7 N rms (± 3.3 N) over 0.14 s, 11277 rev/min, 373 to 4266 Hz
     """
     from rcsa_ident.identified import Result
     from rcsa_ident.workflows.estimate_forces import METHOD, observe

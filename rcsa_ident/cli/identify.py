@@ -24,6 +24,7 @@ from rcsa_ident.cli.common import (
 )
 from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.status import Status
 from rcsa_ident.processes import Workers
 from rcsa_ident.units import to_hz, to_rpm
 
@@ -123,8 +124,8 @@ def identify(
 ) -> None:
     """Find modes and joint of a machine from a campaign of ordinary stable cuts.
 
-    A suspect result is written with its reasons and a warning, exit code 0; one that has not converged or has failed is
-    written, too, with exit code 3.
+    The result is written whatever its status. The exit code is 0 where it has converged, and 3 where it is suspect or has failed:
+    its reasons say why.
     """
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.results import write_result
@@ -278,8 +279,7 @@ def warn_left_out(data: dict[str, Any]) -> None:
 
 
 def exit_by_status(found: Identification) -> None:
-    """End with exit code 3 unless there is an answer that may be used."""
-    if not found.at_minimum:
+    """End with exit code 3 unless the answer has converged."""
+    if found.status is not Status.CONVERGED:
+        warn(f"the result is {found.status}: " + "; ".join(found.reasons))
         raise typer.Exit(NOT_CONVERGED)
-    if str(found.status) == "suspect":
-        warn("the result is suspect: " + "; ".join(found.reasons))

@@ -145,7 +145,7 @@ def learn(
             warn(remark)
         effective = f"{learnt.posterior.effective:.0f} effective draws"
         say(f"written: {out} ({len(cuts.verdict)} labels, {effective}, {stages.seconds['labels']:.1f} s)")
-    if learnt.thin:
+    if learnt.remarks:
         raise typer.Exit(NOT_CONVERGED)
 
 

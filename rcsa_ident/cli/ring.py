@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.errors import InputError
 
 
@@ -54,11 +54,12 @@ def ring(
         ring_figure(found).savefig(plot, dpi=150)
     if json_:
         emit(ring_row(found) | {"out": str(out)})
-        return
-    for line in said:
-        say(line)
-    for remark in found.remarks:
-        warn(remark)
+    else:
+        for line in said:
+            say(line)
+        for remark in found.remarks:
+            warn(remark)
+        say(f"written: {out}")
     if found.suspect:
         warn(f"drawing, spread and ring hardly go together (probability {found.probability:.2g}): look at the lines above")
-    say(f"written: {out}")
+        raise typer.Exit(NOT_CONVERGED)

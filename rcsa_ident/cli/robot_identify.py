@@ -9,11 +9,12 @@ from typing import Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.common import NOT_CONVERGED, Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.identify import read_and_judge
 from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.cli.robot import RobotFile
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.status import Status
 
 
 @answers
@@ -109,7 +110,9 @@ def _from_cuts(robot: Path, folder: Path, out: Path, seed: int, processes: int |
         say(", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items()))
         say(f"written: {out}")
     for reason in found.reasons:
-        warn(f"the result is suspect: {reason}")
+        warn(f"the result is {found.status}: {reason}")
+    if found.status is not Status.CONVERGED:
+        raise typer.Exit(NOT_CONVERGED)
 
 
 def _from_encoders(robot: Path, records: Sequence[Path], out: Path, check: Sequence[Path], json_: bool) -> None:

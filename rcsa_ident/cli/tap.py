@@ -46,7 +46,7 @@ def tap(
     quantity: Annotated[
         Response, typer.Option(help="What the response measures, in SI, where its unit does not say.")
     ] = Response.acceleration,
-    estimator: Annotated[Estimator, typer.Option(help="H1, H2 or their mean.")] = Estimator.h1,
+    estimator: Annotated[Estimator, typer.Option(help="H1, H2, or Hv: the geometric mean of both.")] = Estimator.h1,
     sensor_mass_g: Annotated[float, typer.Option(help="Mass of the sensor, g, at the point that is hit.")] = 0.0,
     rate_hz: Annotated[float | None, typer.Option(help="Sampling rate, Hz, of a file that tells none.", show_default=False)] = None,
     plot: Annotated[Path | None, typer.Option(help="Figure to write (png, svg, pdf).", show_default=False)] = None,

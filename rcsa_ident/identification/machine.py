@@ -97,7 +97,7 @@ class IdentifiedMachine(Machine):
     >>> tip = machine.tip(tool)
     >>> lobes = ri.stability_lobes(tip, ri.CutSpec().process(tool.cutter, machine.workpiece), ri.rpm(12_000, 16_000, 50), 5e-3)
     >>> print(lobes.best_speeds()[0])
-    14550 rev/min: stability limit 2.02 mm, recommended 1.61 mm
+    14550 rev/min: stability limit 2.03 mm, recommended 1.62 mm
     """
 
     identified: Mapping[Dof, MachineAxis]

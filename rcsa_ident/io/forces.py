@@ -84,7 +84,7 @@ def read_forces(path: str | Path) -> ForceEstimate:
     >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
     >>> forces = ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15])
     >>> print(ri.read_forces(forces.save("FORCES.csv")))
-    X 6.62 N rms (± 2.9 N), Y 12.7 N rms (± 3.9 N) over 0.22 s
+    X 6.66 N rms (± 3.1 N), Y 12.7 N rms (± 3.3 N) over 0.14 s
     """
     time, force, deviation = read_forces_csv(path)
     step = float(np.mean(np.diff(time))) if time.size > 1 else 0.0

@@ -77,7 +77,7 @@ class MonitoredCut(Drawn):
     >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
     >>> monitored = ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15])
     >>> monitored.estimate.force.shape
-    (5631, 2)
+    (3584, 2)
     >>> print(monitored.save("FORCES.csv"))
     FORCES.csv
     """

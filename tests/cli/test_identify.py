@@ -14,6 +14,7 @@ from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.diagnostics import failed
 from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.identification.status import Status
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
@@ -158,7 +159,7 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
     monkeypatch.setattr("rcsa_ident.workflows.speed_bands.FEWEST_CUTS", 4)
     # the ids of the hand-made answer are not the campaign's: only the bands' part of the file is of interest
     monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
-    run("identify", small_campaign, "--out", out, "--speed-bands", 2, "--processes", 1)
+    run("identify", small_campaign, "--out", out, "--speed-bands", 2, "--processes", 1, code=3)
     whole, *bands = seen
     assert whole[2] is None
     assert sorted(bands[0][0] + bands[1][0]) == sorted(whole[0])
@@ -174,11 +175,12 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
     ("change", "code"),
     [
         ({"reasons": (Remark(IdentificationCode.NOT_CONVERGED, "it was still gaining"),)}, 3),
-        ({"reasons": (Remark(IdentificationCode.FEW_CUTS, "not converged, says a tooling of that name"),)}, 0),
+        ({"reasons": (Remark(IdentificationCode.FEW_CUTS, "few cuts with a tooling that is called converged"),)}, 3),
+        ({"status": Status.CONVERGED, "reasons": ()}, 0),
         (None, 3),
     ],
 )
-def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campaign, monkeypatch, change, code):
+def test_the_exit_code_follows_the_status(tmp_path, small_campaign, monkeypatch, change, code):
     from rcsa_ident.identification import evidence
 
     class Found:
@@ -192,11 +194,12 @@ def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campai
     monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
     out = tmp_path / "R.json"
     report = ["--report", tmp_path / "report.html"] if change is None else []
-    run("identify", small_campaign, "--out", out, "--processes", 1, *report, code=code)
+    said = run("identify", small_campaign, "--out", out, "--processes", 1, *report, code=code)
     # it is written, whatever it is worth
     data = read_result(out)
-    assert data["status"] == ("failed" if change is None else "suspect")
-    assert data["reasons"]
+    assert data["status"] == ("failed" if change is None else "suspect" if code else "converged")
+    assert bool(data["reasons"]) is bool(code)
+    assert [f"the result is {data['status']}: {reason}" in said.stderr for reason in data["reasons"][:1]] == [True] * bool(code)
     assert (data["axes"] == {}) is (change is None)
 
 

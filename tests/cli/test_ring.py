@@ -47,6 +47,16 @@ def test_a_drawing_is_corrected(rung):
     assert "fluted diameter 9.60 ± 0.3 → 9.8" in words.stdout
 
 
+@pytest.mark.parametrize("form", [(), ("--json",)], ids=["words", "json"])
+def test_a_suspect_answer_is_written_and_ends_with_exit_code_3(rung, tmp_path, monkeypatch, form):
+    monkeypatch.setattr("rcsa_ident.identification.ringing.SUSPECT", 2.0)  # no probability is as high
+    folder, _, _ = rung
+    found = run("ring", folder / "DRAWN.toml", folder / "whole.wav", "--out", tmp_path / "R.toml", *form)
+    assert (found.exit_code, (tmp_path / "R.toml").is_file()) == (3, True)
+    assert "hardly go together" in found.stderr
+    assert not form or json.loads(found.stdout)["status"] == "suspect"
+
+
 def test_a_drawing_is_not_overwritten(rung):
     folder, _, _ = rung
     before = (folder / "DRAWN.toml").read_bytes()

@@ -15,7 +15,6 @@ from sphinx.pycode import ModuleAnalyzer
 
 import rcsa_ident as ri
 from tests.cli.test_path_compensate import robot_result
-from tests.fixtures.campaign import part_of_the_sample_runs
 from tests.fixtures.paths import ROOT
 from tests.fixtures.rung_tooling import rung_tooling
 from tests.signals.test_tap import RATE, hits
@@ -30,11 +29,9 @@ CHOICES = {"Dof", "Quantity"}
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
-    """What examples name: the repository's data, part of the sample runs, the hits of a hammer, a tooling that rings, a robot's result."""
+    """What examples name: the repository's data, the hits of a hammer, a tooling that rings, a robot's result."""
     folder: Path = tmp_path_factory.mktemp("examples")
     (folder / "data").symlink_to(ROOT / "data", target_is_directory=True)
-    (folder / "sample_runs").mkdir()
-    part_of_the_sample_runs(folder / "sample_runs", 4)
     force, response = hits(count=2)
     table = np.stack([np.arange(force.size) / RATE, force, response], axis=1)
     np.savetxt(folder / "hits.csv", table, delimiter=",", header="time (s),hammer (N),tip (m/s^2)", comments="", fmt="%.9e")
@@ -60,7 +57,7 @@ def run(tests: list[doctest.DocTest]) -> int:
 
 @pytest.mark.slow(40)
 def test_examples_are_true(folder, monkeypatch):
-    """All of the package, in one folder: what `identify` saves, others read."""
+    """All of the package, in one folder: what `identify` records and saves, others read."""
     monkeypatch.chdir(folder)
     paths = [p for p in sorted(PACKAGE.rglob("*.py")) if ">>> " in p.read_text(encoding="utf-8")]
     modules = [importlib.import_module(".".join(p.relative_to(ROOT).with_suffix("").parts)) for p in paths]

@@ -28,9 +28,10 @@ def test_its_python_runs(name, code, tmp_path, monkeypatch):
 
 
 def asked() -> dict[str, set[str]]:
-    """Return the options that are used with each command."""
+    """Return the options that are used with each command, there and on the page of all commands."""
     found: dict[str, set[str]] = {}
-    for _, block in blocks("sh"):
+    glance = (ROOT / "docs" / "howto" / "commands.md").read_text(encoding="utf-8")
+    for block in [block for _, block in blocks("sh")] + re.findall(r"^```sh\n(.*?)^```", glance, re.DOTALL | re.MULTILINE):
         for line in block.splitlines():
             words = line.split("#")[0].split()
             if words and words[0] == "rcsa-ident":

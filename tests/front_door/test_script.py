@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
-import pytest
-
 import rcsa_ident as ri
 
 SCRIPT = """
@@ -27,26 +22,8 @@ forces = ri.estimate_forces(machine, tool, ri.read_recording("cut.h5", campaign.
 """
 
 
-@pytest.mark.slow(40)
-def test_as_it_stands(triggered):
-    """No guard, from any folder; the result is the command's, byte for byte."""
-    folder = triggered.folder.parents[1]
-    code = SCRIPT + "print(found)\nprint(forces)\nfound.save('RESULT.json')\n"
-    (folder / "script.py").write_text(code)
-    done = subprocess.run([sys.executable, "script.py"], cwd=folder, capture_output=True, text=True, check=True)
-    pocket, answer, forces = done.stdout.splitlines()
-    assert pocket == "14550 rev/min: stability limit 2.03 mm, recommended 1.68 mm"
-    assert answer.startswith("converged, 16 cuts, X ")
-    assert "N rms" in forces
-    assert done.stderr == ""
-    assert (folder / "lobes.svg").read_text().startswith("<?xml")
-    command = [sys.executable, "-m", "rcsa_ident.cli", "identify", "data/sample_runs", "--out", "COMMAND.json"]
-    subprocess.run(command, cwd=folder, capture_output=True, check=True)
-    assert (folder / "RESULT.json").read_bytes() == (folder / "COMMAND.json").read_bytes()
-
-
-def test_the_same_without_the_search(nouns, tmp_path, monkeypatch, capsys):
-    """Line by line, with a machine that was identified before."""
+def test_it_runs_line_by_line(nouns, tmp_path, monkeypatch, capsys):
+    """With a machine that was identified before; scripts that identify run in `tests/docs/test_page_outputs.py`."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(ri, "identify", lambda campaign, seed: nouns.read, raising=False)
     monkeypatch.setattr(ri, "read_campaign", lambda folder: nouns.campaign, raising=False)

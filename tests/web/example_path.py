@@ -1,7 +1,7 @@
-"""The path of the example with a watch, and the README's pictures of it: ``python -m tests.web.example_path FOLDER``.
+"""The path of the example with a watch, and the documentation's pictures: ``python -m tests.web.example_path docs/page``.
 
 Prints the seconds from the first click to each view that follows, on a service with one process for each kind of work, and writes
-four pictures.
+pictures of it, of a robot and of a tip.
 """
 
 from __future__ import annotations
@@ -12,16 +12,19 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from PIL import Image
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from api.client import Client
+from tests.fixtures.paths import ROOT
+from tests.fixtures.pictures import lighten
 from tests.fixtures.service import serving
-from tests.web.conftest import CHROMIUM, QUIET
+from tests.web.conftest import CHROMIUM, QUIET, drop
 from tests.web.shots import settled
 
 #: As long as anything may take, the identification on a slow machine [ms].
 _LONG = 600_000
+#: FRFs of the tutorial's tip.
+TIP = ROOT / "docs" / "tutorial" / "files"
 
 
 def walked(page: Page) -> str:
@@ -67,9 +70,23 @@ def pictured(browser: Browser, page: Page, client: Client, identification: str, 
     phone.wait_for_selector(".best[data-rpm]", timeout=_LONG)
     settled(phone)
     phone.screenshot(path=folder / "phone.png")
-    for path in folder.glob("*.png"):
-        # a page has few colours: a third of the bytes
-        Image.open(path).convert("RGB").quantize(128).save(path, optimize=True)
+    page.set_viewport_size({"width": 1280, "height": 1130})
+    page.goto(f"{address.split('#')[0]}#/robots?robot=tx200&tooling=Example S3-PG25-long")
+    settled(page)
+    page.screenshot(path=folder / "robot.png")
+    page.set_viewport_size({"width": 1280, "height": 1400})
+    page.goto(f"{address.split('#')[0]}#/tip")
+    drop(page, "h1", [TIP / f"tip_{axis}.frf" for axis in "xy"])
+    for axis in "xy":
+        page.get_by_label(f"Direction of tip_{axis}.frf").select_option(axis.upper())
+    for label, value in (("Teeth", "4"), ("Diameter", "10"), ("Helix", "40"), ("Lowest line", "100")):
+        page.get_by_label(label, exact=True).fill(value)
+    page.get_by_label("Material", exact=True).select_option("EN AW-6082")
+    page.wait_for_selector(".best[data-rpm]", timeout=_LONG)
+    settled(page)
+    page.screenshot(path=folder / "tip.png")
+    for path in (folder / f"{name}.png" for name in ("tool_change", "identification", "verdicts", "phone", "robot", "tip")):
+        lighten(path)
 
 
 def main(folder: Path) -> None:

@@ -18,7 +18,7 @@ from rcsa_ident.workflows.tool_change import ToolChange
 # %%
 # The description travels with the package; ``ri.read_robot`` reads that of another arm.
 arm = ri.FlexibleRobot(ri.sample_robot("tx200"))
-posture = np.radians([-11.71, 20.78, 147.86, 82.76, 60.80, -166.96])
+posture = np.radians([-11.71, 20.78, 110.0, 82.76, 60.80, -166.96])
 machine, tool = ri.PosedRobot(arm, posture), ri.sample_tooling("S1-ER32")
 told = at_posture(arm, posture)
 frequencies = to_hz(told.natural_frequencies)
@@ -49,9 +49,8 @@ right.set(xlabel="spindle speed [rev/min]", ylabel="way along the line [m]", tit
 right.grid(False)
 
 # %%
-# Stretched out the arm is softer, and its own modes limit the cut. The natural frequencies are those that others computed for this
-# posture.
-published = [11.754, 13.651, 22.228, 23.584, 34.867, 55.334]
+# Stretched out the arm is softer, and its own modes limit the cut. Every joint stands within its limits here; at the published
+# posture, where the third one does not, the natural frequencies are those that others computed (validation).
 print(f"highest limit: {1e3 * limits[0].max():.2f} mm near the base, {1e3 * limits[-1].max():.2f} mm stretched out")
-np.testing.assert_allclose(frequencies[:6], published, rtol=1e-4)
+assert arm.model.beyond_limits(posture) == ()
 assert limits[-1].max() < 0.6 * limits[0].max()
