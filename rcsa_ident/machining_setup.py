@@ -21,7 +21,7 @@ from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPIN
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
-from rcsa_ident.tool_holder.catalogue import assumption
+from rcsa_ident.tool_holder.catalogue import assumption, stated
 from rcsa_ident.tool_holder.drawings import Drawing
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.proportions import cutter_values, proportions
@@ -95,6 +95,16 @@ class Tooling(Saved):
         """What is unusual about it, as a wrong unit would make it, and what is assumed of it without a word on how well."""
         assumed = assumption(self.assembly, self.spread)
         return (*proportions(self.assembly, self.cutter), *(() if assumed is None else (assumed,)))
+
+    def stated(self, parameter: str) -> str:
+        """Return what a parameter of the drawing is and how well it is known, as in ``stickout, whose standard deviation is 0.05 mm``.
+
+        Parameters
+        ----------
+        parameter : str
+            Field of an `Alteration`, `IDENTIFIED` in front where records have told of it.
+        """
+        return stated(parameter, self.assembly.contact, self.spread)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.cutter}, {self.assembly}"

@@ -16,7 +16,7 @@ from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread
 
-_CONTACT_SPREADS = ("contact_stiffness_percent", "contact_damping_percent")
+CONTACT_SPREADS = ("contact_stiffness_percent", "contact_damping_percent")
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 
 
@@ -85,7 +85,7 @@ def spread_keys(spread: Spread) -> dict[str, float]:
 def contact_spread_keys(spread: Spread) -> dict[str, float]:
     """Return what `spread` of a tooling file states of the contact alone, so that the rest counts as drawings usually do."""
     # a share and back leaves a last digit that nobody stated
-    return {key: round(spread_keys(spread)[key], 9) for key in _CONTACT_SPREADS}
+    return {key: round(spread_keys(spread)[key], 9) for key in CONTACT_SPREADS}
 
 
 def typical_contact_keys(typical: TypicalContact | None) -> dict[str, Any] | None:

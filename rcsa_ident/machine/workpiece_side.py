@@ -214,9 +214,12 @@ class _Beside:
             return part
         added, first = np.concatenate(more), len(part.change) - part.common
         change = np.concatenate([part.change[:first], added, part.change[first:]])
-        unknowns = {kind: np.insert(moves, [first] * len(added), 0.0, axis=1) for kind, moves in part.unknowns.items()}
+        unknowns, parameters = (
+            {name: np.insert(moves, [first] * len(added), 0.0, axis=1) for name, moves in named.items()}
+            for named in (part.unknowns, part.parameters)
+        )
         unknowns[Doubted.WORKPIECE] = np.eye(len(change))[first : first + len(added)]
-        return replace(part, change=change, unknowns=unknowns)
+        return replace(part, change=change, unknowns=unknowns, parameters=parameters)
 
     def guides(self) -> ComplexArray:
         """Return the tool's curves, and the workpiece's."""

@@ -9,17 +9,28 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from rcsa_ident.dynamics.uncertain import IDENTIFIED
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.plausibility import PlausibilityCode
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
-from rcsa_ident.tool_holder.spread import Spread
+from rcsa_ident.tool_holder.spread import LENGTHS, Spread
 
 #: Least length of a chuck's body in front of the flange [m].
 _LEAST_BODY = 5e-3
 #: Nobody makes a chuck whose nose is wider than so many diameters of the taper's flange.
 _WIDEST = 1.4
+_OF_CONTACT = ("translational", "rotational")
+#: What each field of an `Alteration` is, and the field of `Spread` that says how well it is known.
+_PARAMETERS = {
+    "stickout": ("stickout", "stickout"),
+    "fluted_length": ("length of the fluted part", "segment_length"),
+    "fluted_diameter": ("diameter of the fluted part", "fluted_diameter"),
+    "youngs_modulus": ("modulus of the tool", "youngs_modulus"),
+    "holder_diameter": ("diameter of the holder", "holder_diameter"),
+    **{f"{way}_{what}": (f"{way} {what} of the holder–tool joint", f"contact_{what}") for way in _OF_CONTACT for what in ("stiffness", "damping")},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +203,18 @@ def assumption(assembly: ToolAssembly, spread: Spread) -> Remark | None:
         f"the contact has the catalogue's assumed values of a {typical.kind}, which nobody has measured, but {taken}: safe depths come "
         f"out too high; [spread] should state {_percents(typical.spread)}",
     )
+
+
+def stated(parameter: str, contact: Contact | None, spread: Spread) -> str:
+    """Return what a parameter of a drawing is and how well it is known; see `Tooling.stated`."""
+    field = parameter.removeprefix(IDENTIFIED)
+    words, key = _PARAMETERS[field]
+    if field != parameter:
+        return f"{words}, which was identified"
+    size = getattr(spread, key)
+    told = f"{1e3 * size:g} mm" if key in LENGTHS else f"{100.0 * size:g} %"
+    assumed = field.startswith(_OF_CONTACT) and assumed_contact(contact) is not None
+    return f"{words}, which is assumed ({told})" if assumed else f"{words}, whose standard deviation is {told}"
 
 
 @cache

@@ -293,7 +293,8 @@ def advise(
 def _band_of(change: ToolChange, speed: float, tolerance: float) -> BandShares | None:
     """What the band of the limit at a recommended speed consists of."""
     ((_, tip),) = change.tips(np.array([speed]), change.omega, spread=True)
-    return band_shares(tip, change.process, speed, change.max_depth, tolerance) if isinstance(tip, UncertainReceptance) else None
+    asked = change.process, speed, change.max_depth, tolerance, change.tooling.stated
+    return band_shares(tip, *asked) if isinstance(tip, UncertainReceptance) else None
 
 
 @dataclass(frozen=True, slots=True)

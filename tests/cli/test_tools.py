@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import app as whole
 from rcsa_ident.cli import tools
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.tool_holder.spread import Spread
 from tests.fixtures.tool_library import END_MILL, end_mill, library
 
 TOOLING = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings" / "S1-ER32.toml"
@@ -118,19 +119,26 @@ def test_a_drawing_is_written(tmp_path):
 def test_a_holder_of_the_catalogue_is_printed_as_a_tooling_takes_it(tmp_path):
     assert "HSK-A63" in run("holders").output
     # brackets are no markup of the terminal's
-    assert "[holder] and [contact]" in CliRunner().invoke(whole, ["holders", "--help"]).output
+    assert "[holder], [contact] and [spread]" in CliRunner().invoke(whole, ["holders", "--help"]).output
     text = run("holders", "HSK-A63", "ER32", "--bore-mm", 12).output
     assert text.startswith("# HSK-A63 ER32, bore 12 mm, 100 mm, 1.54 kg")
     assert "[holder]" in text
     head = TOOLING.read_text(encoding="utf-8").split("[holder]")[0]
     (tmp_path / "made.toml").write_text(head + text, encoding="utf-8")
-    made = read_tooling(tmp_path / "made.toml").assembly
+    drawn = read_tooling(tmp_path / "made.toml")
+    made = drawn.assembly
+    spread = drawn.spread
+    assert (spread.contact_stiffness, spread.contact_damping, spread.stickout) == pytest.approx((0.7, 1.0, Spread().stickout))
+    assert "contact_stiffness_percent = 70.0" in text
     assert made.holder_length == pytest.approx(0.1)
     assert made.contact.rotational_damping == 40.0
     assert "# contact, collet: chosen for this project's virtual machines, not measured" in text
     nobody_knows = run("holders", "HSK-A63", "hydraulic", "--bore-mm", 12).output
     assert "[contact]" not in nobody_knows
-    said = json.loads(run("holders", "HSK-A63", "ER32", "--bore-mm", 12, "--json").stdout)["contact"]
+    assert "[spread]" in nobody_knows
+    answer = json.loads(run("holders", "HSK-A63", "ER32", "--bore-mm", 12, "--json").stdout)
+    said = answer["contact"]
+    assert answer["spread"] == {"contact_stiffness_percent": 70.0, "contact_damping_percent": 100.0}
     assert said["keys"]["translational_stiffness"] == made.contact.translational_stiffness
     assert (said["kind"], said["stiffness_spread_percent"], said["damping_spread_percent"]) == ("collet", 70.0, 100.0)
     assert json.loads(run("holders", "HSK-A63", "power", "--bore-mm", 20, "--json").stdout)["contact"] is None
