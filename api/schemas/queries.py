@@ -296,7 +296,7 @@ class Band(Answer):
 
     deviation_percent: float = Field(description="Standard deviation of the limit.")
     shares: list[BandShare]
-    depends_most_on: DependsMostOn | None = Field(None, description="null where no single parameter of drawing or coefficients leads.")
+    depends_most_on: DependsMostOn | None = Field(None, description="null where no parameter of drawing or coefficients is uncertain.")
     in_words: str = Field(description="What dominates it, what helps and what the depth depends on most; empty where the band is narrow.")
 
 

@@ -26,6 +26,8 @@ _COEFFICIENTS = {
     "tangential": ("tangential cutting coefficient", "tangential_spread"),
     "radial_ratio": ("radial ratio of the cutting coefficients", "ratio_spread"),
 }
+#: What is no single parameter; and the share from which on one is worth a sentence.
+_NO_SINGLE, _WORTH_NAMING = (Doubted.STIFFNESS, Doubted.WORKPIECE, Doubted.MACHINE), 0.1
 #: What helps.
 _HELP = {
     Doubted.CONTACT: "tap it, ring it or cut once",
@@ -70,7 +72,7 @@ class BandShares(Shown):
     shares : mapping of Doubted to float
         Of its square; their sum is 1.
     leading : Leading or None
-        The parameter of drawing or coefficients that holds more of it than any other, or than what is no single parameter.
+        The parameter of drawing or coefficients that holds more of it than any other; None where there is none.
     """
 
     spindle_speed: float
@@ -91,9 +93,12 @@ class BandShares(Shown):
         said, wide = [], 100.0 * self.deviation
         if self.dominant is not None:
             share = 100.0 * self.shares[self.dominant]
-            said.append(f"{share:.0f} % of the band of this limit (standard deviation {wide:.0f} %) is {self.dominant}: {_HELP[self.dominant]}")
-        if self.deviation >= WIDE and self.leading is not None:
-            said.append(f"The depth depends most on the {self.leading.words}")
+            said.append(
+                f"{share:.0f} % of the band of this limit (standard deviation {wide:.0f} %) is {self.dominant}: {_HELP[self.dominant]}"
+            )
+        if self.deviation >= WIDE and self.leading is not None and self.leading.share >= _WORTH_NAMING:
+            most = self.leading.share >= max(self.shares.get(each, 0.0) for each in _NO_SINGLE)
+            said.append(f"{'The' if most else 'Of single values, the'} depth depends most on the {self.leading.words}")
         return ". ".join(said)
 
     def __str__(self) -> str:
@@ -162,23 +167,14 @@ def band_shares(
         what, own = _COEFFICIENTS[name]
         return f"{what}, whose standard deviation is {100.0 * getattr(known, own):.2g} %"
 
-    return replace(found, leading=_leading(slopes, parameters, found.shares, words))
+    whole = float(slopes @ slopes)
+    alone = {name: _told_by(moves, slopes) / whole for name, moves in parameters.items()}
+    leading = max(alone, key=alone.__getitem__, default=None)
+    return found if leading is None else replace(found, leading=Leading(leading, alone[leading], words(leading)))
 
 
 def _padded(moves: Mapping[Name, FloatArray]) -> dict[Name, FloatArray]:
     return {name: np.pad(each, ((0, 0), (0, 2))) for name, each in moves.items()}
-
-
-def _leading(
-    slopes: FloatArray, parameters: Mapping[str, FloatArray], shares: Mapping[Doubted, float], words: Callable[[str], str]
-) -> Leading | None:
-    """The parameter whose exact knowledge alone would take away most of a variance; None where what is no single parameter holds more."""
-    whole = float(slopes @ slopes)
-    alone = {name: _told_by(moves, slopes) / whole for name, moves in parameters.items()}
-    name = max(alone, key=alone.__getitem__, default="")
-    if not name or alone[name] < max(shares.get(each, 0.0) for each in (Doubted.STIFFNESS, Doubted.WORKPIECE, Doubted.MACHINE)):
-        return None
-    return Leading(name, alone[name], words(name))
 
 
 def _told_by(moves: FloatArray, slopes: FloatArray) -> float:
