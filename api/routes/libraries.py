@@ -63,7 +63,8 @@ async def import_library(
     material: Annotated[str | None, Query(max_length=50, description="Instead of the library's material.")] = None,
     holder: Annotated[str | None, Query(max_length=200, description="Holder of the library, for tools without one.")] = None,
     contact: Annotated[
-        str | None, Query(pattern=NAME_PATTERN, description="Name of the tooling whose contact parameters are used; without it the catalogue's are assumed.")
+        str | None,
+        Query(pattern=NAME_PATTERN, description="Name of the tooling whose contact parameters are used; without it the catalogue's are."),
     ] = None,
     replace: Annotated[bool, Query(description="Overwrite existing toolings.")] = False,
 ) -> ImportAnswer:

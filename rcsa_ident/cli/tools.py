@@ -56,7 +56,9 @@ def import_tools(
     contact: Annotated[
         Path | None,
         typer.Option(
-            help="TOOLING.toml whose contact between tool and holder is used; default: the catalogue's, assumed.", show_default=False, rich_help_panel=_ASSUMED
+            help="TOOLING.toml whose contact between tool and holder is used; default: the catalogue's.",
+            show_default=False,
+            rich_help_panel=_ASSUMED,
         ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,

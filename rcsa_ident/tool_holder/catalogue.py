@@ -29,7 +29,11 @@ _PARAMETERS = {
     "fluted_diameter": ("diameter of the fluted part", "fluted_diameter"),
     "youngs_modulus": ("modulus of the tool", "youngs_modulus"),
     "holder_diameter": ("diameter of the holder", "holder_diameter"),
-    **{f"{way}_{what}": (f"{way} {what} of the holder–tool joint", f"contact_{what}") for way in _OF_CONTACT for what in ("stiffness", "damping")},
+    **{
+        f"{way}_{what}": (f"{way} {what} of the holder–tool joint", f"contact_{what}")
+        for way in _OF_CONTACT
+        for what in ("stiffness", "damping")
+    },
 }
 
 
@@ -246,7 +250,8 @@ def _alike(typical: Contact, contact: Contact | None) -> bool:
 
 
 def _percents(spread: Spread) -> str:
-    return f"contact_stiffness_percent = {100.0 * spread.contact_stiffness:g} and contact_damping_percent = {100.0 * spread.contact_damping:g}"
+    stiffness, damping = 100.0 * spread.contact_stiffness, 100.0 * spread.contact_damping
+    return f"contact_stiffness_percent = {stiffness:g} and contact_damping_percent = {damping:g}"
 
 
 def _body(nose: float, behind: float, length: float, slope_deg: float | None) -> list[BeamSegment]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import app as whole
 from rcsa_ident.cli import tools
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.tool_holder import catalogue
 from rcsa_ident.tool_holder.spread import Spread
 from tests.fixtures.tool_library import END_MILL, end_mill, library
 
@@ -145,3 +147,17 @@ def test_a_holder_of_the_catalogue_is_printed_as_a_tooling_takes_it(tmp_path):
     assert "rcsa-ident contact" in nobody_knows
     assert "--bore-mm: found 25 mm" in run("holders", "HSK-A63", "ER32", "--bore-mm", 25, code=2).output
     assert "--bore-mm" in run("holders", "HSK-A63", "ER32", code=2).output
+
+
+def test_the_tutorial_shows_what_holders_prints_and_keeps_how_uncertain_it_is(tmp_path):
+    text = (TOOLING.parents[3] / "docs" / "tutorial" / "ten_minutes.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(?:\w*)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (asked,) = [k for k, block in enumerate(blocks) if block.startswith("rcsa-ident holders ")]
+    shown, printed = blocks[asked + 1].splitlines(), run(*blocks[asked].split()[1:]).output.splitlines()
+    assert len(shown) == len(printed)
+    assert all(
+        line.startswith(told.removesuffix(" …")) if told.endswith("…") else line == told for told, line in zip(shown, printed, strict=True)
+    )
+    (tmp_path / "TOOL.toml").write_text(blocks[asked + 2], encoding="utf-8")
+    tooling = read_tooling(tmp_path / "TOOL.toml")
+    assert (tooling.spread, tooling.remarks) == (catalogue.holder("HSK-A63", "ER32", 0.010).spread, ())

@@ -84,7 +84,8 @@ def test_the_projects_toolings_keep_everything_else(path, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "spread", ["[spread]\n", "[spread]\ncontact_stiffness_percent = 70 # assumed\n", "spread = {}\n", "spread.contact_damping_percent = 100\n"]
+    "spread",
+    ["[spread]\n", "[spread]\ncontact_stiffness_percent = 70 # assumed\n", "spread = {}\n", "spread.contact_damping_percent = 100\n"],
 )
 def test_a_calibrated_contact_is_known_as_well_as_the_taps_say(spread, tmp_path):
     path, out = tmp_path / "T.toml", tmp_path / "C.toml"
