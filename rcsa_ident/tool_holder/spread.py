@@ -74,5 +74,5 @@ LENGTHS = ("stickout", "segment_length", "corner_radius")
 #: Largest standard deviations that anybody may believe in.
 LARGEST_LENGTH, LARGEST_SHARE = 5e-3, 3.0
 #: Everything as drawn, and the same where nobody has said how well the drawing is known.
-EXACT = Spread(**dict.fromkeys(SPREAD_FIELDS, 0.0))
+EXACT = replace(Spread(), **dict.fromkeys(SPREAD_FIELDS, 0.0))  # type: ignore[arg-type]
 UNSTATED = replace(EXACT, stated=False)

@@ -53,7 +53,7 @@ function worth(contact) {
     return note("doubt", "No typical contact is known of this chuck: the one below is as it was. A hit on the tip of the clamped tool tells it.");
   const { kind, source, stiffness_spread_percent: stiffness, damping_spread_percent: damping } = contact;
   const spreads = `standard deviation of its stiffness ${plain(stiffness, 0)} %, of its damping ${plain(damping, 0)} %`;
-  return note("doubt", `The contact below is now the typical one, ${kind}: ${source} (${spreads}, which the card below it holds). A hit on the tip of the clamped tool tells it better.`);
+  return note("doubt", `The contact below is now the typical one, ${kind}: ${source} (${spreads}; the card below the contact states them). A hit on the tip of the clamped tool tells it better.`);
 }
 
 const tell = (place, error) =>
