@@ -21,10 +21,11 @@ from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPIN
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.tool_holder.catalogue import assumption, stated
 from rcsa_ident.tool_holder.drawings import Drawing
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.proportions import cutter_values, proportions
-from rcsa_ident.tool_holder.spread import EXACT, Spread
+from rcsa_ident.tool_holder.spread import UNSTATED, Spread
 from rcsa_ident.units import to_rpm
 
 #: Median of the positive half of a normal distribution over its standard deviation, and about the spread of its logarithm.
@@ -42,7 +43,7 @@ class Tooling(Saved):
     assembly : ToolAssembly
         As drawn.
     spread : Spread
-        How well the drawing is known.
+        How well the drawing is known; by default it counts as exact, and a remark names a contact that only the catalogue assumes.
     tool_model, holder_model : str
         Tools of the same model share what is not known of them, wherever they are clamped; holders of the same model (and bore) share
         their contact. Empty where nothing is shared.
@@ -70,7 +71,7 @@ class Tooling(Saved):
     name: str
     cutter: Cutter
     assembly: ToolAssembly
-    spread: Spread = EXACT
+    spread: Spread = UNSTATED
     tool_model: str = ""
     holder_model: str = ""
     taper: str = ""
@@ -91,8 +92,19 @@ class Tooling(Saved):
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What is unusual about it, as a wrong unit would make it."""
-        return proportions(self.assembly, self.cutter)
+        """What is unusual about it, as a wrong unit would make it, and what is assumed of it without a word on how well."""
+        assumed = assumption(self.assembly, self.spread)
+        return (*proportions(self.assembly, self.cutter), *(() if assumed is None else (assumed,)))
+
+    def stated(self, parameter: str) -> str:
+        """Return what a parameter of the drawing is and how well it is known, as in ``stickout, whose standard deviation is 0.05 mm``.
+
+        Parameters
+        ----------
+        parameter : str
+            Field of an `Alteration`, `IDENTIFIED` in front where records have told of it.
+        """
+        return stated(parameter, self.assembly.contact, self.spread)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.cutter}, {self.assembly}"
@@ -110,7 +122,7 @@ class BareCutter(Tooling):
     """
 
     def __init__(self, name: str, cutter: Cutter) -> None:
-        fields: dict[str, Any] = {"name": name, "cutter": cutter, "spread": EXACT, "tool_model": "", "holder_model": ""}
+        fields: dict[str, Any] = {"name": name, "cutter": cutter, "spread": UNSTATED, "tool_model": "", "holder_model": ""}
         for field_name, value in fields.items():
             object.__setattr__(self, field_name, value)
         tuple(remarks_of(cutter_values(cutter)))  # an impossible one is refused

@@ -26,6 +26,8 @@ class PlausibilityCode(StrEnum):
     """A value outside its usual range."""
     PROPORTION = "proportion"
     """Two values that do not fit each other."""
+    ASSUMED = "assumed"
+    """A value that nobody has measured, taken as if it were known better."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,9 @@ from fastapi import APIRouter, Path, Query
 
 from api.conventions import guard, problems
 from api.schemas.holders import CatalogueAnswer, ChuckAnswer, Holders, TypicalContactAnswer
-from api.schemas.toolings import HolderKeys
+from api.schemas.toolings import HolderKeys, SpreadKeys
 from api.security import Guarded
-from rcsa_ident.io.toolings import holder_keys, typical_contact_keys
+from rcsa_ident.io.toolings import contact_spread_keys, holder_keys, typical_contact_keys
 from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, tapers
 
 router = APIRouter(prefix="/holders", tags=["toolings"], route_class=Guarded)
@@ -40,4 +40,5 @@ def get(
         sources=list(found.sources),
         holder=HolderKeys.model_validate(holder_keys(found)),
         contact=TypicalContactAnswer.model_validate(typical) if (typical := typical_contact_keys(found.contact)) else None,
+        spread=SpreadKeys.model_validate(contact_spread_keys(found.spread) if typical else {}),
     )

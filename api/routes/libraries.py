@@ -63,7 +63,8 @@ async def import_library(
     material: Annotated[str | None, Query(max_length=50, description="Instead of the library's material.")] = None,
     holder: Annotated[str | None, Query(max_length=200, description="Holder of the library, for tools without one.")] = None,
     contact: Annotated[
-        str | None, Query(pattern=NAME_PATTERN, description="Name of the tooling whose contact parameters are used.")
+        str | None,
+        Query(pattern=NAME_PATTERN, description="Name of the tooling whose contact parameters are used; without it the catalogue's are."),
     ] = None,
     replace: Annotated[bool, Query(description="Overwrite existing toolings.")] = False,
 ) -> ImportAnswer:
@@ -73,7 +74,7 @@ async def import_library(
     joint = None
     if contact is not None:
         joint = found_or_404(await run_in_threadpool(components.store.toolings.get, caller.group, contact), f"tooling {contact}").text
-    given = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, None, holder)
+    given = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, holder=holder)
     entries = await while_there(request, components.work.run(imported, raw, given, joint))
 
     def keep() -> list[ImportedTool]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from api.schemas.common import Answer
-from api.schemas.toolings import ContactKeys, HolderKeys
+from api.schemas.toolings import ContactKeys, HolderKeys, SpreadKeys
 
 
 class ChuckAnswer(Answer):
@@ -41,3 +41,4 @@ class CatalogueAnswer(Answer):
     sources: list[str] = Field(description="Of the dimensions; what is typical is called so.")
     holder: HolderKeys
     contact: TypicalContactAnswer | None = Field(description="null where nothing is known of this kind of chuck.")
+    spread: SpreadKeys = Field(description="Of a tooling with this holder and contact, until they are measured.")

@@ -312,12 +312,21 @@ class BandShare(Answer):
     share: float = Field(description="Of the variance of the limit's logarithm; all shares together are 1.")
 
 
+class DependsMostOn(Answer):
+    """The one parameter that a stability limit depends on most."""
+
+    parameter: str
+    share: float = Field(description="Of the variance of the limit's logarithm that its exact knowledge would take away.")
+    in_words: str = Field(description="What it is and how well it is known: assumed, stated or identified.")
+
+
 class Band(Answer):
     """What the band of the first recommended cut's stability limit consists of."""
 
     deviation_percent: float = Field(description="Standard deviation of the limit.")
     shares: list[BandShare]
-    in_words: str = Field(description="What dominates it and what helps; empty where nothing does, or the band is narrow.")
+    depends_most_on: DependsMostOn | None = Field(None, description="null where no parameter of drawing or coefficients is uncertain.")
+    in_words: str = Field(description="What dominates it, what helps and what the depth depends on most; empty where the band is narrow.")
 
 
 class ToolingLobes(Answer):

@@ -25,10 +25,10 @@ def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[
         Text of the tooling whose contact parameters all toolings get.
     """
     if contact is not None:
-        known = tooling_of(contact).assembly.contact
-        if known is None:
+        known = tooling_of(contact)
+        if known.assembly.contact is None:
             raise InputError("contact", "a tooling without one", "a tooling with a table [contact]")
-        assumptions = replace(assumptions, contact=known)
+        assumptions = replace(assumptions, contact=known.assembly.contact, spread=known.spread)
     entries = import_tools(raw, "", assumptions, MOST_TOOLS)
     names = library_names([entry.name for entry in entries])
     return [(name, entry.text, entry.notes, entry.reason) for name, entry in zip(names, entries, strict=True)]

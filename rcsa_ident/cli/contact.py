@@ -66,7 +66,7 @@ def contact(
         found = calibrate_contact(
             taps, prior, modulus_spread=modulus_spread / 100.0, gain_spread=max(gain_spread / 100.0, 1e-6), progress=line
         )
-    write_calibrated_tooling(tooling, out, found.contact, _remarks(found, taps))
+    write_calibrated_tooling(tooling, out, found.contact, found.log_std.tolist(), _remarks(found, taps))
     if plot is not None:
         _draw(found, taps, plot)
     if json_:

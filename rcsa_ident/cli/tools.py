@@ -14,6 +14,7 @@ from rcsa_ident.remarks import counted
 if TYPE_CHECKING:
     from rcsa_ident.io.tool_libraries import Imported
     from rcsa_ident.tool_holder.geometry import Contact
+    from rcsa_ident.tool_holder.spread import Spread
 
 _ASSUMED = "What the library does not state"
 
@@ -55,7 +56,9 @@ def import_tools(
     contact: Annotated[
         Path | None,
         typer.Option(
-            help="TOOLING.toml whose contact between tool and holder is used here as well.", show_default=False, rich_help_panel=_ASSUMED
+            help="TOOLING.toml whose contact between tool and holder is used; default: the catalogue's.",
+            show_default=False,
+            rich_help_panel=_ASSUMED,
         ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,
@@ -67,7 +70,7 @@ def import_tools(
 
     if (out is None) != list_:
         raise InputError("--out", "nothing" if out is None else "given together with --list", "a folder, or --list")
-    assumed = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, _contact(contact), holder)
+    assumed = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, *_contact(contact), holder)
     entries = _chosen(read_tool_library(library, assumed), tool or [], str(library))
     made = [entry for entry in entries if entry.tooling is not None]
     paths: list[Path] = []
@@ -132,8 +135,8 @@ def holders(
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Print a holder of the catalogue as \\[holder] and \\[contact] of a TOOLING.toml, or what there is."""
-    from rcsa_ident.io.toolings import holder_keys, tooling_text, typical_contact_keys
+    """Print a holder of the catalogue as \\[holder], \\[contact] and \\[spread] of a TOOLING.toml, or what there is."""
+    from rcsa_ident.io.toolings import contact_spread_keys, holder_keys, tooling_text, typical_contact_keys
     from rcsa_ident.tool_holder.catalogue import bores, chucks, tapers
     from rcsa_ident.tool_holder.catalogue import holder as made
 
@@ -151,9 +154,10 @@ def holders(
         raise InputError(missing, "nothing", "a taper, a chuck and --bore-mm, as HSK-A63 ER32 --bore-mm 12")
     found = made(taper, chuck, bore_mm * 1e-3, None if length_mm is None else length_mm * 1e-3)
     keys: dict[str, Any] = {"holder": holder_keys(found)}
-    typical = typical_contact_keys(found.contact)
+    typical, spread = typical_contact_keys(found.contact), {} if found.contact is None else contact_spread_keys(found.spread)
     if json_:
-        emit({"name": f"{taper} {chuck}", "mass_kg": found.mass, "sources": list(found.sources), **keys, "contact": typical})
+        head = {"name": f"{taper} {chuck}", "mass_kg": found.mass, "sources": list(found.sources)}
+        emit({**head, **keys, "contact": typical, "spread": spread})
         return
     told = f"contact, {chuck}: no value is known; a hit on the tip of the clamped tool and rcsa-ident contact tell it"
     if typical is not None:
@@ -162,18 +166,20 @@ def holders(
             f"contact, {typical['kind']}: {typical['source']} (standard deviation of its stiffness "
             f"{typical['stiffness_spread_percent']:g} %, of its damping {typical['damping_spread_percent']:g} %)"
         )
-    say(tooling_text(keys, (str(found), *found.sources, told)).rstrip())
+    left = "[spread]: standard deviations; a key that is left out has its usual value"
+    say(tooling_text(keys | {"spread": spread}, (str(found), *found.sources, told, left)).rstrip())
 
 
-def _contact(path: Path | None) -> Contact | None:
+def _contact(path: Path | None) -> tuple[Contact | None, Spread | None]:
+    """A tooling's contact, and how well it is known."""
     if path is None:
-        return None
+        return None, None
     from rcsa_ident.io.setups import read_tooling
 
-    contact = read_tooling(path).assembly.contact
-    if contact is None:
+    tooling = read_tooling(path)
+    if tooling.assembly.contact is None:
         raise InputError("contact", "none", "a tooling with a table [contact]", str(path))
-    return contact
+    return tooling.assembly.contact, tooling.spread
 
 
 def _chosen(entries: list[Imported], wanted: list[str], where: str) -> list[Imported]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property, partial
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,14 @@ from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.receptance import Receptance
 
 Places = NDArray[np.intp]
+Name = TypeVar("Name", bound=str)
 #: Largest change of a receptance between two nodes of `thinned`, as a share; quintics go through six nodes.
 CHANGE = 0.065
 #: Widest distance of two such nodes, in lines, and how much it grows from line to line.
 WIDEST, GROWTH = 16.0, 0.1
+
+#: In front of the name of a parameter that records have told of.
+IDENTIFIED = "identified "
 
 
 class Doubted(StrEnum):
@@ -50,12 +54,15 @@ class Variation:
         So many of the last directions are the same ones in all variations.
     unknowns : mapping of Doubted to array, shape (k, p)
         What belongs to each, as k unknowns that move so far along the directions; of what is not named nothing is told.
+    parameters : mapping of str to array, shape (k, p)
+        The same, parameter by parameter of a drawing; `IDENTIFIED` in front of those that records have told of.
     """
 
     members: tuple[int, ...]
     change: ComplexArray
     common: int = 0
     unknowns: Mapping[Doubted, FloatArray] = field(default_factory=dict)
+    parameters: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 class Spread(Protocol):
@@ -107,14 +114,11 @@ class UncertainReceptance(Receptance):
 
     def unknowns(self) -> dict[Doubted, FloatArray]:
         """Return what the directions of `spread` belong to, shape (k, p) each: unknowns that move so far along them."""
-        parts = self._variations()
-        count, directions = _directions(parts)
-        rows: dict[Doubted, list[FloatArray]] = {}
-        for part, own in zip(parts, directions, strict=True):
-            for name, moves in part.unknowns.items():
-                rows.setdefault(name, []).append(np.zeros((len(moves), count)))
-                rows[name][-1][:, own] = moves
-        return {name: np.concatenate(each) for name, each in rows.items()}
+        return _moves(parts := self._variations(), [part.unknowns for part in parts])
+
+    def parameters(self) -> dict[str, FloatArray]:
+        """Return the same as `unknowns`, parameter by parameter of a drawing."""
+        return _moves(parts := self._variations(), [part.parameters for part in parts])
 
     def deviation(self) -> dict[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]:
         """Return the standard deviations of real and imaginary part, shape (n,) each, of every entry that has one."""
@@ -309,6 +313,17 @@ def _directions(parts: Sequence[Variation]) -> tuple[int, list[Places]]:
     last = np.arange(sum(own), sum(own) + common)
     firsts = np.cumsum([0, *own])
     return sum(own) + common, [np.concatenate([np.arange(first, first + size), last]) for first, size in zip(firsts, own, strict=False)]
+
+
+def _moves(parts: Sequence[Variation], named: Sequence[Mapping[Name, FloatArray]]) -> dict[Name, FloatArray]:
+    """How far what each variation names moves along the directions of all."""
+    count, directions = _directions(parts)
+    rows: dict[Name, list[FloatArray]] = {}
+    for own, each in zip(directions, named, strict=True):
+        for name, moves in each.items():
+            rows.setdefault(name, []).append(np.zeros((len(moves), count)))
+            rows[name][-1][:, own] = moves
+    return {name: np.concatenate(each) for name, each in rows.items()}
 
 
 def _weighted(weights: FloatArray, change: ComplexArray) -> ComplexArray:

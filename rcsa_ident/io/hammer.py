@@ -8,17 +8,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 import tomlkit
-from tomlkit.items import Table
+from tomlkit.items import InlineTable, Table
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import read_bytes, write_text
 from rcsa_ident.io.frf_files import read_frfs
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.setups import SPREADS, read_tooling
 from rcsa_ident.io.toml_text import LARGEST_SETUP, one_line
+from rcsa_ident.io.toolings import CONTACT_SPREADS
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.machining_setup import HammerTest
 from rcsa_ident.tool_holder.geometry import Contact
+from rcsa_ident.tool_holder.spread import LARGEST_SHARE
 
 #: Direction by direction of a file that names none.
 _AXES = ("X", "Y")
@@ -87,8 +89,10 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
     return HammerFile(label, path, found)
 
 
-def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Contact, remarks: Sequence[str] = ()) -> None:
-    """Write a tooling file again with another contact; everything else stays as it was written, comments included.
+def write_calibrated_tooling(
+    source: str | Path, target: str | Path, contact: Contact, log_std: Sequence[float], remarks: Sequence[str] = ()
+) -> None:
+    """Write a tooling file again with another contact and how well that is known; all else stays as it was written, comments included.
 
     Parameters
     ----------
@@ -96,6 +100,9 @@ def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Co
         Tooling file that is read, and the one that is written.
     contact : Contact
         The new one.
+    log_std : sequence of float, length 4
+        Standard deviations of its logarithms, stiffnesses first; `spread` of a file has one number for translation and rotation, and the
+        larger one is honest. A file that states nothing of the rest goes on to count as exact there.
     remarks : sequence of str
         Written above it as comments.
     """
@@ -122,6 +129,12 @@ def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Co
     else:
         document.pop("contact", None)
         document.append("contact", table)
+    if "spread" not in document:
+        document.append("spread", tomlkit.item(dict.fromkeys(SPREADS, 0)))
+    spread = document["spread"]
+    assert isinstance(spread, Table | InlineTable)
+    for key, size in zip(CONTACT_SPREADS, (max(log_std[:2]), max(log_std[2:])), strict=True):
+        spread[key] = float(f"{100.0 * min(size, LARGEST_SHARE):.3g}")
     write_text(target, tomlkit.dumps(document))
 
 

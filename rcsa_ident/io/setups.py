@@ -27,8 +27,9 @@ from rcsa_ident.plausibility import (
 )
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
+from rcsa_ident.tool_holder.catalogue import assumed_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, behind, clamped
-from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, Spread
+from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, UNSTATED, Spread
 from rcsa_ident.tool_holder.taper import tapers
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -116,6 +117,8 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str, tip_known: bool =
     stickout = tool.quantity("stickout_mm", STICKOUT) * 1e-3
     insertion = holder.number("insertion_mm", "mm", least=0.0, most=5000.0) * 1e-3
     carriers = beam_segments(holder, materials)
+    # beside a tip that is known by itself nothing hangs on the drawing
+    silent = EXACT if tip_known else UNSTATED
     contact = _contact(top.table("contact", _CONTACT)) if "contact" in top else None
     with top.naming({"stickout + insertion": "tool.stickout_mm + holder.insertion_mm", "insertion": "holder.insertion_mm"}):
         assembly = clamped(pieces, carriers, stickout, insertion, contact)
@@ -123,7 +126,7 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str, tip_known: bool =
             name,
             cutter,
             assembly,
-            spread_of(top.table("spread", tuple(SPREADS))) if "spread" in top else EXACT,
+            spread_of(top.table("spread", tuple(SPREADS)), contact) if "spread" in top else silent,
             tool.text("model", ""),
             holder.text("model", ""),
             holder.text("taper", "", choices=tapers()),
@@ -131,9 +134,10 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str, tip_known: bool =
         )
 
 
-def spread_of(table: Table) -> Spread:
-    """Return how well a drawing is known; what the table leaves out is what an honest drawing is good for."""
-    honest = Spread()
+def spread_of(table: Table, contact: Contact | None = None) -> Spread:
+    """Return how well a drawing is known; what the table leaves out is what an honest drawing, or the catalogue's contact, is good for."""
+    assumed = assumed_contact(contact)
+    honest = Spread() if assumed is None else assumed.spread
     found = {}
     for key, (field, size) in SPREADS.items():
         most = (LARGEST_LENGTH if field in LENGTHS else LARGEST_SHARE) / size

@@ -25,10 +25,12 @@ from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.library_shapes import NotRead, check_type, iso_geometry, iso_shape_keys, shape_keys
 from rcsa_ident.io.setups import tooling_of
 from rcsa_ident.io.toml_text import keys_of_toml
-from rcsa_ident.io.toolings import tooling_text
+from rcsa_ident.io.toolings import contact_keys, contact_spread_keys, tooling_text
 from rcsa_ident.io.validated_table import Table, listed
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
+from rcsa_ident.tool_holder.spread import Spread
 
 LARGEST_LIBRARY = 32 * MEGABYTE
 MOST_ENTRIES = 20_000
@@ -57,7 +59,9 @@ class Assumptions:
     material : str or None
         Material of the tools; None takes the library's.
     contact : Contact or None
-        Contact of tool and holder; None joins them rigidly.
+        Contact of tool and holder; None assumes the catalogue's.
+    spread : Spread or None
+        How well that contact is known, where its tooling states it.
     holder : str or None
         Holder of the library for tools that have none of their own.
     """
@@ -68,6 +72,7 @@ class Assumptions:
     insertion_mm: float | None = None
     material: str | None = None
     contact: Contact | None = None
+    spread: Spread | None = None
     holder: str | None = None
 
     def __post_init__(self) -> None:
@@ -279,12 +284,20 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
         "tool": {"stickout_mm": stickout, "segments": segments},
         "holder": {"insertion_mm": insertion, "segments": holder},
     }
-    if given.contact is None:
-        notes.append("no contact: tool and holder are joined rigidly; calibrate it, or take that of a tooling with the same clamping")
+    contact, spread = given.contact, given.spread
+    if contact is None:
+        own = entry.data.get("holder")
+        named = " ".join(_name(each) for each in (own, spare) if isinstance(each, Mapping))
+        typical = typical_contact("shrink fit" if "shrink" in named.lower() else "collet")
+        contact, spread = typical.contact, typical.spread
+        notes.append(
+            f"contact assumed, that of a {typical.kind}: {typical.source}; calibrate it, or take that of a tooling with the same clamping"
+        )
     else:
         notes.append("contact taken from another tooling")
-        keys = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
-        data["contact"] = {key: getattr(given.contact, key) for key in keys}
+    data["contact"] = contact_keys(contact)
+    # without a word on it the reader knows what is usual, and of an assumed contact what the catalogue states
+    data["spread"] = contact_spread_keys(spread) if spread is not None and spread.stated else {}
     return data, notes
 
 

@@ -16,6 +16,7 @@ from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread
 
+CONTACT_SPREADS = ("contact_stiffness_percent", "contact_damping_percent")
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 
 
@@ -45,7 +46,7 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
             data[part]["model"] = model
     if tooling.taper:
         data["holder"]["taper"] = tooling.taper
-    if not tooling.spread.exact:
+    if tooling.spread.stated:
         data["spread"] = spread_keys(tooling.spread)
     own = {name: material for name, material in materials.items() if name not in MATERIALS}
     return data | ({"materials": {name: _material(material) for name, material in own.items()}} if own else {})
@@ -79,6 +80,12 @@ def contact_keys(contact: Contact) -> dict[str, float]:
 def spread_keys(spread: Spread) -> dict[str, float]:
     """Return how well a drawing is known as `spread` of a tooling file, in percent and millimetres."""
     return {key: getattr(spread, field) / size for key, (field, size) in SPREADS.items()}
+
+
+def contact_spread_keys(spread: Spread) -> dict[str, float]:
+    """Return what `spread` of a tooling file states of the contact alone, so that the rest counts as drawings usually do."""
+    # a share and back leaves a last digit that nobody stated
+    return {key: round(spread_keys(spread)[key], 9) for key in CONTACT_SPREADS}
 
 
 def typical_contact_keys(typical: TypicalContact | None) -> dict[str, Any] | None:

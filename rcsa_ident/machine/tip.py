@@ -15,7 +15,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling._kernels import changes_of_planes, tip_changes, tips_of_planes, tips_over
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.uncertain import Doubted, Places, UncertainReceptance, Variation
+from rcsa_ident.dynamics.uncertain import IDENTIFIED, Doubted, Places, UncertainReceptance, Variation
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.drawings import FittedDrawing
@@ -399,18 +399,20 @@ class TipSpread:
             if side.doubt is not None:
                 machine = np.concatenate([holder.changes(side, places), holder.tip(side.rivals[:, places]) - here])
             machine, open_, moves = self._with_drawing(k, places, machine)
-            kinds = [_KINDS[name] for name in self.drawing.fields]
+            kinds, told = [_KINDS[name] for name in self.drawing.fields], self.drawing.fields[: self.drawing.known.size]
             if stiffer is not None:
                 open_ = np.concatenate([open_, (stiffer[k].tip(w) - here)[None]])
                 moves = np.pad(moves, ((0, 1), (0, 1)))
                 moves[-1, -1] = 1.0
                 kinds.append(Doubted.STIFFNESS)
             unknowns = {kind: moves[[each is kind for each in kinds]] for kind in dict.fromkeys(kinds)}
+            names = [IDENTIFIED + name if name in told else name for name in self.drawing.fields]
+            parameters = {name: moves[[k for k, each in enumerate(names) if each == name]] for name in names}
             change = np.concatenate([machine, open_])
             if not len(change):
                 change, unknowns = np.zeros((1, *here.shape), dtype=complex), {}
             # the tool-holder is the same one for all parts
-            found.append(Variation(self.members[k], change, len(open_), unknowns))
+            found.append(Variation(self.members[k], change, len(open_), unknowns, parameters))
         return tuple(found)
 
     def _with_drawing(self, k: int, places: Places, machine: ComplexArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:

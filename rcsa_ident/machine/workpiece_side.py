@@ -16,7 +16,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
 from rcsa_ident.dynamics.poles import PoleResidue
-from rcsa_ident.dynamics.uncertain import Doubted, Places, Spread, UncertainReceptance, Variation
+from rcsa_ident.dynamics.uncertain import Doubted, Name, Places, Spread, UncertainReceptance, Variation
 from rcsa_ident.errors import InputError
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.recording import Role
@@ -214,9 +214,13 @@ class _Beside:
             return part
         added, first = np.concatenate(more), len(part.change) - part.common
         change = np.concatenate([part.change[:first], added, part.change[first:]])
-        unknowns = {kind: np.insert(moves, [first] * len(added), 0.0, axis=1) for kind, moves in part.unknowns.items()}
+
+        def moved(named: Mapping[Name, FloatArray]) -> dict[Name, FloatArray]:
+            return {name: np.insert(moves, [first] * len(added), 0.0, axis=1) for name, moves in named.items()}
+
+        unknowns, parameters = moved(part.unknowns), moved(part.parameters)
         unknowns[Doubted.WORKPIECE] = np.eye(len(change))[first : first + len(added)]
-        return replace(part, change=change, unknowns=unknowns)
+        return replace(part, change=change, unknowns=unknowns, parameters=parameters)
 
     def guides(self) -> ComplexArray:
         """Return the tool's curves, and the workpiece's."""

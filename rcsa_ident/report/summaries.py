@@ -337,7 +337,9 @@ def band_summary(band: BandShares | None) -> dict[str, Any] | None:
     if band is None:
         return None
     shares = [{"of": str(name), "share": share} for name, share in band.shares.items()]
-    return {"deviation_percent": 100.0 * band.deviation, "shares": shares, "in_words": band.words}
+    most = band.leading
+    leading = None if most is None else {"parameter": most.name, "share": most.share, "in_words": most.words}
+    return {"deviation_percent": 100.0 * band.deviation, "shares": shares, "depends_most_on": leading, "in_words": band.words}
 
 
 def _point(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.dynamics.uncertain import Doubted, UncertainReceptance
+from rcsa_ident.dynamics.uncertain import Doubted, Name, UncertainReceptance
 from rcsa_ident.shown import Shown
 from rcsa_ident.stability.lobes import DEEPER, embedded, known_directions
 from rcsa_ident.stability.tip_modes import TIP
@@ -20,6 +21,13 @@ from rcsa_ident.stability.zero_order import ZeroOrder
 WIDE, DOMINANT = 0.05, 0.5
 #: Speeds within the tolerance at which the lowest limit is looked for.
 _SPEEDS = 9
+#: Single parameters among the cutting coefficients, and where their standard deviation stands.
+_COEFFICIENTS = {
+    "tangential": ("tangential cutting coefficient", "tangential_spread"),
+    "radial_ratio": ("radial ratio of the cutting coefficients", "ratio_spread"),
+}
+#: What is no single parameter; and the share from which on one is worth a sentence.
+_NO_SINGLE, _WORTH_NAMING = (Doubted.STIFFNESS, Doubted.WORKPIECE, Doubted.MACHINE), 0.1
 #: What helps.
 _HELP = {
     Doubted.CONTACT: "tap it, ring it or cut once",
@@ -31,6 +39,24 @@ _HELP = {
     Doubted.COEFFICIENTS: "calibrate them on a dynamometer",
     Doubted.MACHINE: "more cuts narrow it",
 }
+
+
+class Leading(NamedTuple):
+    """The one parameter that a limit depends on most.
+
+    Parameters
+    ----------
+    name : str
+        A field of `Alteration`, `IDENTIFIED` in front where records have told of it, or ``tangential`` or ``radial_ratio``.
+    share : float
+        Of the variance of the limit's logarithm that its exact knowledge would take away.
+    words : str
+        What it is, and how well it is known.
+    """
+
+    name: str
+    share: float
+    words: str
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -45,11 +71,14 @@ class BandShares(Shown):
         Standard deviation of the logarithm of the limit.
     shares : mapping of Doubted to float
         Of its square; their sum is 1.
+    leading : Leading or None
+        The parameter of drawing or coefficients that holds more of it than any other; None where there is none.
     """
 
     spindle_speed: float
     deviation: float
     shares: Mapping[Doubted, float]
+    leading: Leading | None = None
 
     @property
     def dominant(self) -> Doubted | None:
@@ -60,17 +89,30 @@ class BandShares(Shown):
 
     @property
     def words(self) -> str:
-        """A sentence on what dominates the band and what helps; empty where nothing does."""
-        if self.dominant is None:
-            return ""
-        share, wide = 100.0 * self.shares[self.dominant], 100.0 * self.deviation
-        return f"{share:.0f} % of the band of this limit (standard deviation {wide:.0f} %) is {self.dominant}: {_HELP[self.dominant]}"
+        """Sentences on what dominates the band, what helps, and which value the depth depends on most; empty where the band is narrow."""
+        said, wide = [], 100.0 * self.deviation
+        if self.dominant is not None:
+            share = 100.0 * self.shares[self.dominant]
+            said.append(
+                f"{share:.0f} % of the band of this limit (standard deviation {wide:.0f} %) is {self.dominant}: {_HELP[self.dominant]}"
+            )
+        if self.deviation >= WIDE and self.leading is not None and self.leading.share >= _WORTH_NAMING:
+            most = self.leading.share >= max(self.shares.get(each, 0.0) for each in _NO_SINGLE)
+            said.append(f"{'The' if most else 'Of single values, the'} depth depends most on the {self.leading.words}")
+        return ". ".join(said)
 
     def __str__(self) -> str:
         return self.words or f"standard deviation of the limit {100.0 * self.deviation:.2g} %, nothing dominates it"
 
 
-def band_shares(tip: UncertainReceptance, process: MillingProcess, speed: float, max_depth: float, tolerance: float) -> BandShares | None:
+def band_shares(
+    tip: UncertainReceptance,
+    process: MillingProcess,
+    speed: float,
+    max_depth: float,
+    tolerance: float,
+    stated: Callable[[str], str] = str,
+) -> BandShares | None:
     """Return what the band of the limit near a speed consists of; None where some of the tip's spread is not known, or no limit is found.
 
     Parameters
@@ -82,6 +124,8 @@ def band_shares(tip: UncertainReceptance, process: MillingProcess, speed: float,
     max_depth : float [m]
     tolerance : float
         Share of the speed within which the lowest limit counts, as in `StabilityLobes.recommended_depth`.
+    stated : callable
+        Given the name of a parameter of the drawing, returns what it is and how well it is known.
 
     Notes
     -----
@@ -100,18 +144,43 @@ def band_shares(tip: UncertainReceptance, process: MillingProcess, speed: float,
         return method.depths(nodes.omega, embedded(values, nodes, wanted), process, at, deepest, factors)
 
     at = speeds[[int(np.argmin(limits(nodes.values[None], speeds)[0]))]]
-    change, unknowns = nodes.spread, nodes.unknowns()
+    change, unknowns, parameters = nodes.spread, nodes.unknowns(), nodes.parameters()
     logarithms = np.zeros((len(change), 2))
     if known.tangential_spread or known.ratio_spread:
         # two directions more, along which the tip stays
         change = np.concatenate([change, np.zeros((2, *change.shape[1:]))])
         logarithms = np.concatenate([logarithms, np.diag([known.tangential_spread, known.ratio_spread])])
-        unknowns = {name: np.pad(moves, ((0, 0), (0, 2))) for name, moves in unknowns.items()}
+        unknowns, parameters = _padded(unknowns), _padded(parameters)
         unknowns[Doubted.COEFFICIENTS] = np.eye(2, len(change), len(change) - 2)
+        parameters |= {name: row[None] for name, row in zip(_COEFFICIENTS, unknowns[Doubted.COEFFICIENTS], strict=True)}
     ends = [np.log(limits(nodes.values + sign * change, at, np.exp(sign * logarithms))[:, 0]) for sign in (0.5, -0.5)]
     if not np.all(np.isfinite(ends)):
         return None
-    return shares_of(ends[0] - ends[1], unknowns, float(at[0]))
+    slopes = ends[0] - ends[1]
+    found = shares_of(slopes, unknowns, float(at[0]))
+    if found is None:
+        return None
+
+    def words(name: str) -> str:
+        if name not in _COEFFICIENTS:
+            return stated(name)
+        what, own = _COEFFICIENTS[name]
+        return f"{what}, whose standard deviation is {100.0 * getattr(known, own):.2g} %"
+
+    whole = float(slopes @ slopes)
+    alone = {name: _told_by(moves, slopes) / whole for name, moves in parameters.items()}
+    leading = max(alone, key=alone.__getitem__, default=None)
+    return found if leading is None else replace(found, leading=Leading(leading, alone[leading], words(leading)))
+
+
+def _padded(moves: Mapping[Name, FloatArray]) -> dict[Name, FloatArray]:
+    return {name: np.pad(each, ((0, 0), (0, 2))) for name, each in moves.items()}
+
+
+def _told_by(moves: FloatArray, slopes: FloatArray) -> float:
+    """How much of a variance the exact knowledge of some unknowns takes away."""
+    _, size, directions = np.linalg.svd(moves, full_matrices=False)
+    return float(np.sum((directions[size > 1e-9 * size.max()] @ slopes) ** 2))
 
 
 def shares_of(slopes: FloatArray, unknowns: Mapping[Doubted, FloatArray], speed: float) -> BandShares | None:
@@ -133,8 +202,7 @@ def shares_of(slopes: FloatArray, unknowns: Mapping[Doubted, FloatArray], speed:
         if each not in unknowns:
             continue
         spanned = np.vstack([spanned, unknowns[each]])
-        _, size, directions = np.linalg.svd(spanned, full_matrices=False)
-        told = float(np.sum((directions[size > 1e-9 * size.max()] @ slopes) ** 2))
+        told = _told_by(spanned, slopes)
         shares[each], taken = (told - taken) / whole, told
     shares[Doubted.MACHINE] = 1.0 - taken / whole
     return BandShares(speed, float(np.sqrt(whole)), shares)

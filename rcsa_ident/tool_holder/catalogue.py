@@ -9,14 +9,32 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from rcsa_ident.dynamics.uncertain import IDENTIFIED
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.plausibility import PlausibilityCode
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
-from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
+from rcsa_ident.tool_holder.spread import LENGTHS, Spread
 
 #: Least length of a chuck's body in front of the flange [m].
 _LEAST_BODY = 5e-3
 #: Nobody makes a chuck whose nose is wider than so many diameters of the taper's flange.
 _WIDEST = 1.4
+_OF_CONTACT = ("translational", "rotational")
+#: What each field of an `Alteration` is, and the field of `Spread` that says how well it is known.
+_PARAMETERS = {
+    "stickout": ("stickout", "stickout"),
+    "fluted_length": ("length of the fluted part", "segment_length"),
+    "fluted_diameter": ("diameter of the fluted part", "fluted_diameter"),
+    "youngs_modulus": ("modulus of the tool", "youngs_modulus"),
+    "holder_diameter": ("diameter of the holder", "holder_diameter"),
+    **{
+        f"{way}_{what}": (f"{way} {what} of the holder–tool joint", f"contact_{what}")
+        for way in _OF_CONTACT
+        for what in ("stiffness", "damping")
+    },
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +58,11 @@ class TypicalContact:
     stiffness_spread: float
     damping_spread: float
     source: str
+
+    @property
+    def spread(self) -> Spread:
+        """How well a drawing with this contact is known: the contact as stated here, the rest as drawings usually are."""
+        return Spread(contact_stiffness=self.stiffness_spread, contact_damping=self.damping_spread)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -65,6 +88,11 @@ class CatalogueHolder(Shown):
     insertion: float
     sources: tuple[str, ...]
     contact: TypicalContact | None
+
+    @property
+    def spread(self) -> Spread:
+        """How well a tooling with this holder and its contact is known before anybody has measured it."""
+        return Spread() if self.contact is None else self.contact.spread
 
     @property
     def length(self) -> float:
@@ -142,8 +170,63 @@ def holder(taper: str, chuck: str, bore: float, length: float | None = None) -> 
     outer.append(BeamSegment(collar, 1e-3 * flange["flange_diameter"], MATERIALS["steel"]))
     rear = body["rear"] * bore if body["rear"] < 1.0 else min(1e-3 * body["rear"], 0.8 * nose)
     segments = tuple(_bored(outer, clamped, bore, rear))
+    typical = typical_contact(body["contact"]) if "contact" in body else None
     sources = f"{taper}: {flange['source']}", f"{chuck}: {body['source']}"
-    return CatalogueHolder(taper, chuck, segments, clamped, sources, _contact(body.get("contact")))
+    return CatalogueHolder(taper, chuck, segments, clamped, sources, typical)
+
+
+def assumed_contact(contact: Contact | None) -> TypicalContact | None:
+    """Return what the catalogue says of a contact that has its assumed values, None of any other.
+
+    Examples
+    --------
+    >>> assumed_contact(Contact(2e10, 6e5, 1e5, 40.0)).kind
+    'collet'
+    >>> assumed_contact(Contact(1.9e10, 6e5, 1e5, 40.0)) is None
+    True
+    """
+    return next((each for kind in _data()["contacts"] if _alike((each := typical_contact(kind)).contact, contact)), None)
+
+
+def assumption(assembly: ToolAssembly, spread: Spread) -> Remark | None:
+    """Return a remark on a contact that only the catalogue assumes, where it is taken as if it were known better, else None.
+
+    Who states 0 has measured it, or knows it as only a virtual machine is known.
+    """
+    typical = assumed_contact(assembly.contact)
+    if typical is None or assembly.insertion == 0.0:
+        return None
+    if not spread.stated:
+        taken = "it counts as exact"
+    elif any(0.0 < getattr(spread, key) < getattr(typical.spread, key) - 1e-9 for key in ("contact_stiffness", "contact_damping")):
+        taken = f"[spread] states {_percents(spread)}"
+    else:
+        return None
+    return Remark(
+        PlausibilityCode.ASSUMED,
+        f"the contact has the catalogue's assumed values of a {typical.kind}, which nobody has measured, but {taken}: safe depths come "
+        f"out too high; [spread] should state {_percents(typical.spread)}",
+    )
+
+
+def stated(parameter: str, contact: Contact | None, spread: Spread) -> str:
+    """Return what a parameter of a drawing is and how well it is known; see `Tooling.stated`."""
+    field = parameter.removeprefix(IDENTIFIED)
+    words, key = _PARAMETERS[field]
+    if field != parameter:
+        return f"{words}, which was identified"
+    size = getattr(spread, key)
+    told = f"{1e3 * size:g} mm" if key in LENGTHS else f"{100.0 * size:g} %"
+    assumed = field.startswith(_OF_CONTACT) and assumed_contact(contact) is not None
+    return f"{words}, which is assumed ({told})" if assumed else f"{words}, whose standard deviation is {told}"
+
+
+@cache
+def typical_contact(kind: str) -> TypicalContact:
+    """Return what the catalogue assumes of the contact of a kind of chuck, ``collet`` or ``shrink fit``."""
+    found = _entry("contacts", "contact", kind)
+    contact = Contact(**{field.name: found[field.name] for field in fields(Contact)})
+    return TypicalContact(kind, contact, 1e-2 * found["stiffness_spread_percent"], 1e-2 * found["damping_spread_percent"], found["source"])
 
 
 @cache
@@ -159,12 +242,16 @@ def _entry(table: str, field: str, name: str) -> dict[str, Any]:
     return found
 
 
-def _contact(kind: str | None) -> TypicalContact | None:
-    if kind is None:
-        return None
-    found = _entry("contacts", "contact", kind)
-    contact = Contact(**{field.name: found[field.name] for field in fields(Contact)})
-    return TypicalContact(kind, contact, 1e-2 * found["stiffness_spread_percent"], 1e-2 * found["damping_spread_percent"], found["source"])
+def _alike(typical: Contact, contact: Contact | None) -> bool:
+    """Whether a contact is the typical one but for the rounding of whoever wrote it."""
+    return contact is not None and all(
+        math.isclose(getattr(typical, field.name), getattr(contact, field.name), rel_tol=1e-6) for field in fields(Contact)
+    )
+
+
+def _percents(spread: Spread) -> str:
+    stiffness, damping = 100.0 * spread.contact_stiffness, 100.0 * spread.contact_damping
+    return f"contact_stiffness_percent = {stiffness:g} and contact_damping_percent = {damping:g}"
 
 
 def _body(nose: float, behind: float, length: float, slope_deg: float | None) -> list[BeamSegment]:

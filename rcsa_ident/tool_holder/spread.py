@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 
 from rcsa_ident.errors import InputError, non_negative
 
@@ -33,6 +33,8 @@ class Spread:
     segment_length : float [m]
     corner_radius : float [m]
         Of the cutting edge; a flat end mill's corners are usually broken.
+    stated : bool
+        Whether somebody said so: a drawing of which nothing is said counts as exact, too, but nobody vouches for it.
 
     Examples
     --------
@@ -50,6 +52,7 @@ class Spread:
     spindle_joint: float = 0.05
     segment_length: float = 0.05e-3
     corner_radius: float = 0.1e-3
+    stated: bool = field(default=True, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in SPREAD_FIELDS:
@@ -65,10 +68,11 @@ class Spread:
         return not any(getattr(self, name) for name in SPREAD_FIELDS)
 
 
-SPREAD_FIELDS = tuple(each.name for each in fields(Spread))
+SPREAD_FIELDS = tuple(each.name for each in fields(Spread) if each.compare)
 #: Those that are lengths [m]; the others are shares.
 LENGTHS = ("stickout", "segment_length", "corner_radius")
 #: Largest standard deviations that anybody may believe in.
 LARGEST_LENGTH, LARGEST_SHARE = 5e-3, 3.0
-#: Everything as drawn.
-EXACT = Spread(**dict.fromkeys(SPREAD_FIELDS, 0.0))
+#: Everything as drawn, and the same where nobody has said how well the drawing is known.
+EXACT = replace(Spread(), **dict.fromkeys(SPREAD_FIELDS, 0.0))  # type: ignore[arg-type]
+UNSTATED = replace(EXACT, stated=False)

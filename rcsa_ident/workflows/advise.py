@@ -125,7 +125,8 @@ def _band_of(change: ToolChange, speed: float, tolerance: float) -> BandShares |
     if change.draws < 2:
         return None
     ((_, tip),) = change.tips(np.array([speed]), change.machine.lines(), spread=True)
-    return band_shares(tip, change.process, speed, change.max_depth, tolerance) if isinstance(tip, UncertainReceptance) else None
+    asked = change.process, speed, change.max_depth, tolerance, change.tooling.stated
+    return band_shares(tip, *asked) if isinstance(tip, UncertainReceptance) else None
 
 
 def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:

@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
+from typer.testing import CliRunner
 
 from api.work import tasks
 from api.work.machine_cache import MachineCache
+from rcsa_ident.cli import app
 from rcsa_ident.cutting.materials import materials
 from rcsa_ident.identification import machine as identified
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.setups import tooling_of
 from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.tool_holder.catalogue import holder
 from rcsa_ident.workflows import tool_change
 from rcsa_ident.workflows.tool_change import ToolChange, tooltip
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
 from tests.fixtures.service import example
 
+CUT = {"feed_per_tooth_mm": 0.1}
 SPEEDS = {"from_rpm": 6000, "to_rpm": 9000, "step_rpm": 500}
 RPM = math.pi / 30.0
 
@@ -157,11 +164,51 @@ def test_a_holder_of_the_catalogue_makes_a_tooling(shop):
     contact = found.contact.keys
     assert contact.translational_stiffness == 2e10
     assert "not measured" in found.contact.source
+    assert found.spread.model_dump(exclude_none=True) == {"contact_stiffness_percent": 70.0, "contact_damping_percent": 100.0}
+    assert set(client.holder("HSK-A63", "hydraulic", 12.0).spread.model_dump().values()) == {None}
     assert client.holder("HSK-A63", "hydraulic", 12.0).contact is None
     tooling = example(holder=found.holder.model_dump(exclude_none=True), contact=contact.model_dump())
-    assert client.lobes(id, tooling, speeds=SPEEDS).toolings[0].limit_depth_mm
+    (answer,) = client.lobes(id, tooling, speeds=SPEEDS).toolings
+    assert any("catalogue's assumed values of a collet" in each for each in answer.warnings)
     assert refused(422, client.holder, "HSK-A63", "ER32", 25.0).errors[0].field == "bore_mm"
     assert refused(422, client.holder, "HSK-A32", "ER32", 12.0).errors[0].field == "taper"
+
+
+def run(*arguments):
+    answer = CliRunner().invoke(app, [str(each) for each in arguments])
+    assert answer.exit_code == 0, answer.output
+    return answer
+
+
+def test_a_holder_of_the_catalogue_gives_one_depth_by_all_doors(shop, result, tmp_path):
+    """Command line, service and Python: what `holders` hands out is as uncertain as it says, and the depth names what it depends on."""
+    client, id = shop
+    found, made = client.holder("HSK-A63", "ER32", 12.0), holder("HSK-A63", "ER32", 0.012)
+    parts = {key: getattr(found, key).model_dump(exclude_none=True) for key in ("holder", "spread")}
+    sent = example(contact=found.contact.keys.model_dump(), **parts)
+    (advice,) = client.advice(id, sent, speeds=SPEEDS, cut=CUT).toolings
+    tool = tooling_of(sent, "", "")
+    tool = replace(tool, assembly=replace(tool.assembly, holder=made.segments, contact=made.contact.contact), spread=made.spread)
+    change = ToolChange(
+        machine_from_json(json.loads(result), ""), tool, CutSpec(feed_per_tooth=1e-4), np.arange(6000, 9001, 500) * RPM, 0.01
+    )
+    by_python = tool_change.advise(change).recommended[0]
+    assert advice.highest_removal[0].axial_depth_mm == pytest.approx(1e3 * by_python.depth, rel=1e-9)
+    (tmp_path / "m.json").write_text(result)
+    text = tomli_w.dumps({key: sent[key] for key in ("name", "cutter", "tool")})
+    (tmp_path / "t.toml").write_text(text + run("holders", "HSK-A63", "ER32", "--bore-mm", 12).output)
+    asked = ("--feed-per-tooth-mm", 0.1, "--speed-from", 6000, "--speed-to", 9000, "--speed-step", 500)
+    (said,) = json.loads(run("advise", tmp_path / "m.json", tmp_path / "t.toml", *asked, "--json").stdout)["toolings"]
+    assert said["highest_removal"][0]["axial_depth_mm"] == pytest.approx(1e3 * by_python.depth, rel=1e-9)
+    most = advice.band.depends_most_on
+    assert said["band"]["depends_most_on"] == most.model_dump()
+    assert most.in_words.endswith(
+        ("of the holder–tool joint, which is assumed (70 %)", "of the holder–tool joint, which is assumed (100 %)")
+    )
+    assert advice.band.in_words.endswith(f"Of single values, the depth depends most on the {most.in_words}")
+    # without a word on how well it is known its band is narrower than it is, and a remark says so
+    (silent,) = client.advice(id, {k: v for k, v in sent.items() if k != "spread"}, speeds=SPEEDS, cut=CUT).toolings
+    assert silent.band.deviation_percent < 0.9 * advice.band.deviation_percent
 
 
 @pytest.mark.parametrize("method", ["multi-frequency", "full-discretisation"])

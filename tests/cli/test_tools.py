@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,6 +14,8 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import app as whole
 from rcsa_ident.cli import tools
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.tool_holder import catalogue
+from rcsa_ident.tool_holder.spread import Spread
 from tests.fixtures.tool_library import END_MILL, end_mill, library
 
 TOOLING = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings" / "S1-ER32.toml"
@@ -118,22 +121,43 @@ def test_a_drawing_is_written(tmp_path):
 def test_a_holder_of_the_catalogue_is_printed_as_a_tooling_takes_it(tmp_path):
     assert "HSK-A63" in run("holders").output
     # brackets are no markup of the terminal's
-    assert "[holder] and [contact]" in CliRunner().invoke(whole, ["holders", "--help"]).output
+    assert "[holder], [contact] and [spread]" in CliRunner().invoke(whole, ["holders", "--help"]).output
     text = run("holders", "HSK-A63", "ER32", "--bore-mm", 12).output
     assert text.startswith("# HSK-A63 ER32, bore 12 mm, 100 mm, 1.54 kg")
     assert "[holder]" in text
     head = TOOLING.read_text(encoding="utf-8").split("[holder]")[0]
     (tmp_path / "made.toml").write_text(head + text, encoding="utf-8")
-    made = read_tooling(tmp_path / "made.toml").assembly
+    drawn = read_tooling(tmp_path / "made.toml")
+    made = drawn.assembly
+    spread = drawn.spread
+    assert (spread.contact_stiffness, spread.contact_damping, spread.stickout) == pytest.approx((0.7, 1.0, Spread().stickout))
+    assert "contact_stiffness_percent = 70.0" in text
     assert made.holder_length == pytest.approx(0.1)
     assert made.contact.rotational_damping == 40.0
     assert "# contact, collet: chosen for this project's virtual machines, not measured" in text
     nobody_knows = run("holders", "HSK-A63", "hydraulic", "--bore-mm", 12).output
     assert "[contact]" not in nobody_knows
-    said = json.loads(run("holders", "HSK-A63", "ER32", "--bore-mm", 12, "--json").stdout)["contact"]
+    assert "[spread]" in nobody_knows
+    answer = json.loads(run("holders", "HSK-A63", "ER32", "--bore-mm", 12, "--json").stdout)
+    said = answer["contact"]
+    assert answer["spread"] == {"contact_stiffness_percent": 70.0, "contact_damping_percent": 100.0}
     assert said["keys"]["translational_stiffness"] == made.contact.translational_stiffness
     assert (said["kind"], said["stiffness_spread_percent"], said["damping_spread_percent"]) == ("collet", 70.0, 100.0)
     assert json.loads(run("holders", "HSK-A63", "power", "--bore-mm", 20, "--json").stdout)["contact"] is None
     assert "rcsa-ident contact" in nobody_knows
     assert "--bore-mm: found 25 mm" in run("holders", "HSK-A63", "ER32", "--bore-mm", 25, code=2).output
     assert "--bore-mm" in run("holders", "HSK-A63", "ER32", code=2).output
+
+
+def test_the_tutorial_shows_what_holders_prints_and_keeps_how_uncertain_it_is(tmp_path):
+    text = (TOOLING.parents[3] / "docs" / "tutorial" / "ten_minutes.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(?:\w*)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (asked,) = [k for k, block in enumerate(blocks) if block.startswith("rcsa-ident holders ")]
+    shown, printed = blocks[asked + 1].splitlines(), run(*blocks[asked].split()[1:]).output.splitlines()
+    assert len(shown) == len(printed)
+    assert all(
+        line.startswith(told.removesuffix(" …")) if told.endswith("…") else line == told for told, line in zip(shown, printed, strict=True)
+    )
+    (tmp_path / "TOOL.toml").write_text(blocks[asked + 2], encoding="utf-8")
+    tooling = read_tooling(tmp_path / "TOOL.toml")
+    assert (tooling.spread, tooling.remarks) == (catalogue.holder("HSK-A63", "ER32", 0.010).spread, ())

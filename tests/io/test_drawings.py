@@ -1,5 +1,7 @@
 """How well drawings are known, in tooling and campaign files, and what is known of toolings in results."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from rcsa_ident.io.setups import read_tooling, tooling_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.toolings import write_tooling
 from rcsa_ident.io.validated_table import Table
+from rcsa_ident.plausibility import PlausibilityCode
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from tests.fixtures.paths import MACHINES
@@ -18,12 +21,44 @@ DRAWN = MACHINES / "toolings" / "S1-ER32.toml"
 
 def keys():
     data = read_toml(DRAWN, "tooling")
+    del data["spread"]
     return {**data, "tool": dict(data["tool"]), "holder": dict(data["holder"])}
 
 
 def test_without_a_table_the_drawing_is_exact_and_an_empty_one_is_honest():
-    assert read_tooling(DRAWN).spread == EXACT
-    assert tooling_of(keys() | {"spread": {}}, "", "t").spread == Spread()
+    silent, told = tooling_of(keys(), "", "t").spread, read_tooling(DRAWN).spread
+    assert (silent, silent.stated) == (EXACT, False)
+    assert (told, told.stated) == (EXACT, True)
+    measured = keys()["contact"] | {"rotational_stiffness": 6.1e5}
+    assert tooling_of(keys() | {"spread": {}, "contact": measured}, "", "t").spread == Spread()
+
+
+@pytest.mark.parametrize(
+    ("spread", "remark"),
+    [
+        (None, "has the catalogue's assumed values of a collet, which nobody has measured, but it counts as exact: safe depths come out"),
+        ({"contact_stiffness_percent": 40}, "[spread] states contact_stiffness_percent = 40 and contact_damping_percent = 100"),
+        ({}, None),
+        ({"contact_stiffness_percent": 70, "contact_damping_percent": 100}, None),
+        ({"contact_stiffness_percent": 0, "contact_damping_percent": 0}, None),
+    ],
+)
+def test_a_contact_of_the_catalogue_is_assumed(spread, remark):
+    """It is known to 70 % and 100 % where [spread] does not say so, too; without the table, or with less, a remark says what is assumed."""
+    data = keys() | ({} if spread is None else {"spread": spread})
+    tooling = tooling_of(data, "", "t")
+    # beside a tip that was measured the drawing is of no account
+    assert spread is not None or tooling_of(data, "", "t", tip_known=True).remarks == ()
+    if spread == {}:
+        assert (tooling.spread.contact_stiffness, tooling.spread.contact_damping) == pytest.approx((0.7, 1.0))
+        assert tooling.spread.stickout == Spread().stickout
+    said = [each for each in tooling.remarks if each.code is PlausibilityCode.ASSUMED]
+    assert [remark in each for each in said] == ([] if remark is None else [True])
+    # the last digit of who wrote it down is nobody's measurement, two percent are
+    for factor, count in ((1.0 + 1e-9, len(said)), (1.02, 0)):
+        contact = replace(tooling.assembly.contact, rotational_stiffness=6e5 * factor)
+        other = replace(tooling, assembly=replace(tooling.assembly, contact=contact))
+        assert len(other.remarks) == count
 
 
 def test_units_and_models_go_through_a_file(tmp_path):
@@ -39,8 +74,10 @@ def test_units_and_models_go_through_a_file(tmp_path):
     again = read_tooling(tmp_path / "t.toml")
     assert (again.spread, again.tool_model, again.holder_model) == (tooling.spread, "EM12-4", "ER32")
     # one that says nothing is written as one that says nothing
+    write_tooling(tmp_path / "silent.toml", tooling_of(keys(), "", "t"))
+    assert "spread" not in (tmp_path / "silent.toml").read_text("utf-8")
     write_tooling(tmp_path / "exact.toml", read_tooling(DRAWN))
-    assert "spread" not in (tmp_path / "exact.toml").read_text("utf-8")
+    assert read_tooling(tmp_path / "exact.toml").spread.stated
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,13 @@ from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.hammer import labelled, read_hammer, write_calibrated_tooling
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import Contact
+from rcsa_ident.tool_holder.spread import Spread
 
 TOOLINGS = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings"
 F = np.array([100.0, 200.0, 300.0])
 H = np.array([1e-8, 2e-8 - 1e-8j, -1e-8j])
 FOUND = Contact(1.234567e10, 7.5e5, 1.5e5, 33.0)
+STD = (0.05, 0.12, 0.3, 2.4)
 
 
 def test_labels(tmp_path):
@@ -65,7 +68,7 @@ def test_a_file_without_a_direct_function(tmp_path):
 @pytest.mark.parametrize("path", sorted(TOOLINGS.glob("*.toml")), ids=lambda p: p.stem)
 def test_the_projects_toolings_keep_everything_else(path, tmp_path):
     out = tmp_path / "C.toml"
-    write_calibrated_tooling(path, out, FOUND, ["from taps"])
+    write_calibrated_tooling(path, out, FOUND, STD, ["from taps"])
     before, after = read_tooling(path), read_tooling(out)
     assert after.assembly.tool == before.assembly.tool
     assert after.assembly.holder == before.assembly.holder
@@ -75,6 +78,20 @@ def test_the_projects_toolings_keep_everything_else(path, tmp_path):
     # what stood there in words stays, outside the contact
     kept = [line for line in path.read_text().split("[contact]")[0].splitlines() if line]
     assert all(line in out.read_text() for line in kept)
+    # how well it is calibrated, the worse of two; what the file says of the rest is as it was
+    assert (after.spread.contact_stiffness, after.spread.contact_damping) == (0.12, 2.4)
+    assert replace(after.spread, contact_stiffness=0.0, contact_damping=0.0) == before.spread
+
+
+@pytest.mark.parametrize(
+    "spread",
+    ["[spread]\n", "[spread]\ncontact_stiffness_percent = 70 # assumed\n", "spread = {}\n", "spread.contact_damping_percent = 100\n"],
+)
+def test_a_calibrated_contact_is_known_as_well_as_the_taps_say(spread, tmp_path):
+    path, out = tmp_path / "T.toml", tmp_path / "C.toml"
+    path.write_text(HEAD + spread if spread.startswith("[") else spread + HEAD)
+    write_calibrated_tooling(path, out, FOUND, STD)
+    assert read_tooling(out).spread == Spread(contact_stiffness=0.12, contact_damping=2.4)
 
 
 HEAD = """\
@@ -97,7 +114,7 @@ def test_a_contact_in_the_middle_and_none_at_all(tmp_path):
     path, out = tmp_path / "T.toml", tmp_path / "C.toml"
     for text in (HEAD, HEAD + "[contact]\n" + OLD + "\n" + REST, HEAD + REST):
         path.write_text(text)
-        write_calibrated_tooling(path, out, FOUND)
+        write_calibrated_tooling(path, out, FOUND, STD)
         read = read_tooling(out)
         assert read.assembly.contact.translational_stiffness == pytest.approx(1.234567e10)
         assert bool(re.search(r"# of the shop\s+\[materials.carbide\]", out.read_text())) == (REST in text)
@@ -115,7 +132,7 @@ def test_a_contact_in_the_middle_and_none_at_all(tmp_path):
 def test_a_contact_written_in_any_form(tmp_path, contact):
     path, out = tmp_path / "T.toml", tmp_path / "C.toml"
     path.write_text("# Ü, of the shop\n" + contact + HEAD)
-    write_calibrated_tooling(path, out, FOUND, ["from taps"])
+    write_calibrated_tooling(path, out, FOUND, STD, ["from taps"])
     read = read_tooling(out).assembly
     assert read.contact.rotational_damping == pytest.approx(FOUND.rotational_damping, rel=1e-7)
     text = out.read_text(encoding="utf-8")
@@ -129,5 +146,5 @@ def test_what_is_no_tooling_leaves_the_other_file_alone(tmp_path):
     path.write_text(HEAD.replace("teeth = 2", "teeth = 0"))
     out.write_text("old")
     with pytest.raises(InputError, match="teeth"):
-        write_calibrated_tooling(path, out, FOUND)
+        write_calibrated_tooling(path, out, FOUND, STD)
     assert out.read_text() == "old"

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.tool_libraries import Assumptions, file_names, import_tools, read_tool_library
+from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
 from tests.fixtures.tool_library import END_MILL, end_mill, inches, library
 
@@ -48,7 +49,10 @@ def test_the_shape_of_tool_and_holder():
     assert 1e3 * assembly.insertion == pytest.approx(44.0, abs=1e-9)
     assert {s.material for s in assembly.tool} == {MATERIALS["carbide"]}
     assert {s.material for s in assembly.holder} == {MATERIALS["steel"]}
-    assert assembly.contact is None
+    # what the library does not know is assumed, and known no better than the catalogue says
+    assert assembly.contact == typical_contact("collet").contact
+    assert found.tooling.spread == typical_contact("collet").spread
+    assert found.tooling.remarks == ()
 
 
 def test_inches_are_the_same_tool():
@@ -78,7 +82,8 @@ def test_the_text_is_the_tooling(tmp_path):
         (END_MILL, {}, "stickout 60 mm, the library's length below the holder (LB)"),
         (END_MILL, {}, "insertion 44 mm assumed: all of the tool behind the holder's nose (OAL and LB); the bore may be shorter"),
         (END_MILL, {}, "holder up to its gauge line, 95 of 135 mm: the rest is inside the spindle"),
-        (END_MILL, {}, "no contact: tool and holder are joined rigidly"),
+        (END_MILL, {}, "contact assumed, that of a collet: chosen for this project's virtual machines, not measured"),
+        (end_mill(holder__description="Shrink 12"), {}, "contact assumed, that of a shrink fit: "),
         (END_MILL, {"contact": Contact(1e10, 1e5)}, "contact taken from another tooling"),
         (end_mill(unit=None), {}, "lengths assumed in millimetres: no unit in the library"),
         (end_mill(BMC="hss"), {}, "high-speed steel modelled as steel"),

@@ -212,6 +212,12 @@ def test_directions_tell_whose_they_are():
         assert modulus @ contact == pytest.approx(correlation)
     # one stickout in both planes
     np.testing.assert_array_equal(*told[DoubtedOf.LENGTHS])
+    # the same one by one: what cuts have told of, and what the drawing alone states
+    single = found.parameters()
+    assert set(single) == {"identified youngs_modulus", "identified translational_stiffness", "rotational_stiffness", "stickout"}
+    np.testing.assert_array_equal(single["identified youngs_modulus"], told[DoubtedOf.TOOL])
+    contacts = np.stack([single["identified translational_stiffness"], single["rotational_stiffness"]], axis=1)
+    np.testing.assert_array_equal(contacts.reshape(4, -1), told[DoubtedOf.CONTACT])
 
 
 def test_modes_without_a_posterior_have_no_bands(assembly):

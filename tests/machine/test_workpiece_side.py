@@ -91,6 +91,7 @@ def test_directions_say_what_they_belong_to():
     machine = replace(by_hand.machine(), workpiece_side=SIDE)
     own, relative = (tip(by_hand.tooling(), OMEGA, True, 0.01) for tip in (machine.tip, machine.relative_tip))
     moves, spread = relative.unknowns(), relative.spread
+    assert all(each.shape[1] == len(spread) for each in (*moves.values(), *relative.parameters().values()))
     assert len(spread) == len(own.spread) + 6
     np.testing.assert_allclose(np.abs(np.tensordot(moves[Doubted.WORKPIECE], spread, axes=1)[:, :, 0, 0]), np.abs(along().changes(OMEGA)))
     stiffer = [np.tensordot(each.unknowns()[Doubted.STIFFNESS], each.spread, axes=1) for each in (own, relative)]

@@ -1,6 +1,6 @@
 """What a drawing does not tell, applied to it."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import log
 
 import pytest
@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.errors import InputError
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
-from rcsa_ident.tool_holder.spread import EXACT, LARGEST_SHARE, Spread
+from rcsa_ident.tool_holder.spread import EXACT, LARGEST_SHARE, SPREAD_FIELDS
 
 CARBIDE, STEEL = MATERIALS["carbide"], MATERIALS["steel"]
 TOOL = (BeamSegment(0.026, 0.0096, CARBIDE), BeamSegment(0.084, 0.012, CARBIDE))
@@ -65,7 +65,7 @@ def test_a_segment_that_nothing_is_left_of_is_refused():
         altered(DRAWN, Alteration(fluted_length=-0.03))
 
 
-@pytest.mark.parametrize("name", [each.name for each in fields(Spread)])
+@pytest.mark.parametrize("name", SPREAD_FIELDS)
 def test_spreads_are_possible_ones(name):
     for wrong in (-1e-6, float("nan"), LARGEST_SHARE * 1.01):
         with pytest.raises(InputError, match=name):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, tapers
+from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, stated, tapers
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 
 TOOLINGS = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings"
@@ -69,6 +70,23 @@ def test_typical_contacts_are_those_that_their_source_names(tooling, chuck):
     assert typical.contact == read_tooling(TOOLINGS / f"{tooling}.toml").assembly.contact
     # the factor of two that its source speaks of
     assert math.exp(typical.stiffness_spread) == pytest.approx(2.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "words"),
+    [
+        ("translational_stiffness", "translational stiffness of the holder–tool joint, which is assumed (70 %)"),
+        ("rotational_damping", "rotational damping of the holder–tool joint, which is assumed (100 %)"),
+        ("stickout", "stickout, whose standard deviation is 0.05 mm"),
+        ("fluted_diameter", "diameter of the fluted part, whose standard deviation is 3 %"),
+        ("identified translational_stiffness", "translational stiffness of the holder–tool joint, which was identified"),
+    ],
+)
+def test_what_is_assumed_of_a_drawing_is_told_from_what_is_stated(parameter, words):
+    made = holder("HSK-A63", "ER32", 0.012)
+    assert stated(parameter, made.contact.contact, made.spread) == words
+    measured = replace(made.contact.contact, rotational_stiffness=6.1e5)
+    assert "assumed" not in stated(parameter, measured, made.spread)
 
 
 def test_what_nobody_knows_of_a_contact_is_not_made_up():

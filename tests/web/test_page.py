@@ -343,12 +343,16 @@ def test_a_longer_stickout_takes_the_tool_out_of_the_bore(opened):
 
 def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, client: Client):
     page = opened("#/toolings/new")
+    expect(page.get_by_label("The drawing is")).to_have_value("rough")
     page.get_by_text("Take one from the catalogue").click()
     page.get_by_label("Taper").select_option("HSK-A63")
     page.get_by_label("Chuck, and the shanks").select_option("ER32")
     image = page.locator("img.drawing")
     first = image.get_attribute("src")
+    # what is taken from the catalogue was not measured
+    (known := page.get_by_label("The drawing is")).select_option("exact")
     page.get_by_role("button", name="Take this holder").click()
+    expect(known).to_have_value("rough")
     expect(page.locator(".note.good")).to_contain_text("HSK-A63 ER32 for a shank of 12 mm")
     expect(page.locator(".note.doubt")).to_contain_text("typical one, collet: chosen for this project's virtual machines, not measured")
     damping = page.locator('[data-field="contact.rotational_damping"] input')
@@ -362,6 +366,7 @@ def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, clie
     # what a ring hears behind its flange
     assert kept.holder.taper == "HSK-A63"
     assert kept.contact == made.contact.keys
+    assert (kept.spread, kept.spread.contact_stiffness_percent) == (made.spread, 70.0)
     client.forget_tooling("T1-catalogue")
     # what the chuck does not take is said in its words
     page.goto(page.url.split("#")[0] + "#/toolings/new")

@@ -8,7 +8,7 @@ const SPREADS = [
   ["stickout_mm", "± Stickout", "length", 0.05, "A presetter's; 0.3 mm with a ruler"],
   ["fluted_diameter_percent", "± Fluted diameter", "percent", 3, "Of an equivalent cylinder"],
   ["youngs_modulus_percent", "± Young's modulus", "percent", 2, "Of the tool"],
-  ["contact_stiffness_percent", "± Contact stiffness", "percent", 40],
+  ["contact_stiffness_percent", "± Contact stiffness", "percent", 40, "70 % where the contact is the catalogue's"],
   ["contact_damping_percent", "± Contact damping", "percent", 100],
   ["holder_diameter_percent", "± Holder diameters", "percent", 0.5],
   ["segment_length_mm", "± Segment lengths", "length", 0.05],
@@ -17,8 +17,12 @@ const SPREADS = [
   ["spindle_joint_percent", "± Flange joint", "percent", 5, "From clamping to clamping"],
 ];
 
-/** The card for the keys of a tooling, and `write(found)`, which puts what is chosen into the keys to send. */
-export function doubtCard(keys) {
+/**
+ * The card for the keys of a tooling, `take(spread)`, and `write(found)`, which puts what is chosen into the keys to send.
+ *
+ * A new tooling is roughly right: that it was measured is for somebody to say. Of one that is kept nothing is said that its file does not.
+ */
+export function doubtCard(keys, fresh) {
   const models = [
     ["tool", "Model of the tool", "As EM12-4: the same wherever it is clamped"],
     ["holder", "Model of the holder", "As PG25: holders of one model share their contact"],
@@ -27,16 +31,19 @@ export function doubtCard(keys) {
     input.value = keys[part].model ?? "";
     return [part, input, field(label, input, { name: `${part}.model`, hint })];
   });
+  const silent = !keys.spread && !fresh;
+  const measured = keys.spread && SPREADS.every(([key]) => keys.spread[key] === 0);
   const known = select(
     [
-      ["exact", "Exactly right"],
+      ...(silent ? [["silent", "Not stated: it counts as exact"]] : []),
       ["rough", "Roughly right"],
+      ["exact", "Exactly right: measured"],
     ],
-    keys.spread ? "rough" : "exact",
+    silent ? "silent" : measured ? "exact" : "rough",
   );
   const spreads = SPREADS.map(([key, label, kind, usual, hint = ""]) => {
     const props = { placeholder: plain(usual * factor(kind), 4) };
-    return [key, quantity(label, kind, keys.spread?.[key] ?? null, { name: `spread.${key}`, hint, props })];
+    return [key, quantity(label, kind, measured ? null : (keys.spread?.[key] ?? null), { name: `spread.${key}`, hint, props })];
   });
   const rough = h(
     "div",
@@ -54,17 +61,24 @@ export function doubtCard(keys) {
       "what stays open widens the bands.",
     ),
   );
-  const show = () => (rough.hidden = known.value === "exact");
+  const show = () => (rough.hidden = known.value !== "rough");
   known.addEventListener("input", show);
   show();
   return {
     box: card("How well the drawing is known", null, h("div", { class: "fields" }, field("The drawing is", known, { name: "spread" })), rough),
+    /** As the catalogue knows what was taken from it. */
+    take(spread) {
+      known.value = "rough";
+      for (const [key, box] of spreads) if (key in spread) box.input.base = spread[key];
+      show();
+    },
     write(found) {
       delete found.spread;
       for (const [part, input] of models) {
         delete found[part].model;
         if (input.value.trim()) found[part].model = input.value.trim();
       }
+      if (known.value === "exact") found.spread = Object.fromEntries(SPREADS.map(([key]) => [key, 0]));
       if (known.value === "rough")
         found.spread = Object.fromEntries(spreads.filter(([, box]) => box.input.base !== null).map(([key, box]) => [key, box.input.base]));
     },

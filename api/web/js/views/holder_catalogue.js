@@ -4,7 +4,7 @@ import { fill, h, note } from "../dom.js";
 import { busy, field, quantity, select } from "../forms.js";
 import { plain } from "../units.js";
 
-/** Where one is chosen; `shank()` is the diameter that it has to hold [mm], `take(holder, contact, taper)` gets the one made. */
+/** Where one is chosen; `shank()` is the diameter that it has to hold [mm], `take(found, taper)` gets the one made. */
 export function catalogueBox(shank, take) {
   const place = h("div", { class: "view" });
   const box = h("details", null, h("summary", null, "Take one from the catalogue"), place);
@@ -31,7 +31,7 @@ async function choices(place, shank, take) {
       if (length.input.base !== null) asked.set("length_mm", length.input.base);
       try {
         const found = await get(`holders/${part(taper.value)}/${part(chuck.value)}?${asked}`);
-        take(found.holder, found.contact?.keys, taper.value);
+        take(found, taper.value);
         const made = `${found.name} for a shank of ${plain(shank(), 2)} mm, ${plain(found.mass_kg, 2)} kg.`;
         fill(told, note("good", made, ...found.sources), worth(found.contact));
       } catch (error) {
@@ -53,7 +53,7 @@ function worth(contact) {
     return note("doubt", "No typical contact is known of this chuck: the one below is as it was. A hit on the tip of the clamped tool tells it.");
   const { kind, source, stiffness_spread_percent: stiffness, damping_spread_percent: damping } = contact;
   const spreads = `standard deviation of its stiffness ${plain(stiffness, 0)} %, of its damping ${plain(damping, 0)} %`;
-  return note("doubt", `The contact below is now the typical one, ${kind}: ${source} (${spreads}). A hit on the tip of the clamped tool tells it better.`);
+  return note("doubt", `The contact below is now the typical one, ${kind}: ${source} (${spreads}; the card below the contact states them). A hit on the tip of the clamped tool tells it better.`);
 }
 
 const tell = (place, error) =>

@@ -45,18 +45,19 @@ export async function view({ name = "" }, query, place) {
   const taper = h("input", { autocomplete: "off", maxlength: 200 });
   taper.value = keys.holder.taper ?? "";
   const contact = contactCard(keys);
-  const doubts = doubtCard(keys);
+  const doubts = doubtCard(keys, !name);
 
   /** The diameter of the tool where it is clamped. */
   function shank() {
     const last = tool.rows().at(-1);
     return last.end_diameter_mm ?? last.outer_diameter_mm;
   }
-  function takeHolder(found, typical, behind) {
-    holder.replace(found.segments);
+  function takeHolder(found, behind) {
+    holder.replace(found.holder.segments);
     taper.value = behind;
-    if (typical) contact.take(typical);
-    deep = insertion.input.base = found.insertion_mm;
+    if (found.contact) contact.take(found.contact.keys);
+    doubts.take(found.spread);
+    deep = insertion.input.base = found.holder.insertion_mm;
     reclamp();
     changed();
   }

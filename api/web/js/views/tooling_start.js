@@ -15,7 +15,9 @@ export const START = {
       { length_mm: 26, outer_diameter_mm: 63, material: "steel" },
     ],
   },
-  contact: { translational_stiffness: 2e10, rotational_stiffness: 6e5, translational_damping: 6e4, rotational_damping: 9 },
+  // what the catalogue of holders assumes of a collet, and how well it is known
+  contact: { translational_stiffness: 2e10, rotational_stiffness: 6e5, translational_damping: 1e5, rotational_damping: 40 },
+  spread: { contact_stiffness_percent: 70, contact_damping_percent: 100 },
 };
 export const SHAPES = [
   ["flat", "flat end"],

@@ -139,7 +139,7 @@ function assumptions(toolings) {
     hint: "The core of a cutter is thinner than its edges",
   });
   const helix = quantity("Helix", "degree", 30);
-  const contact = select([["", "rigid"], ...toolings.map((t) => [t.name, `as in ${t.name}`])], "");
+  const contact = select([["", "assumed, as in the catalogue"], ...toolings.map((t) => [t.name, `as in ${t.name}`])], "");
   const box = h(
     "details",
     null,
