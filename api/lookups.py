@@ -13,6 +13,7 @@ from api.components import Components
 from api.conventions import found_or_404
 from api.problems import Problem
 from api.reading.campaign_text import campaign_of_text
+from api.reading.example_campaign import example_id
 from api.reading.reader_tasks import recording_and_air
 from api.reading.stored import found_of, samples_of
 from api.schemas.robots import Posed, RobotKeys
@@ -106,6 +107,20 @@ def asked_toolings(
 def known_campaign(components: Components, group: str, id: str) -> Campaign:
     """Return a campaign of a group."""
     return found_or_404(components.store.campaigns.get(group, id), "campaign")
+
+
+def own_campaign(components: Components, group: str, id: str) -> Campaign:
+    """Return a campaign of a group that takes recordings: the example takes those of the virtual machine alone."""
+    campaign = known_campaign(components, group, id)
+    refuse_example("campaign", id, group)
+    return campaign
+
+
+def refuse_example(field: str, id: str, group: str) -> None:
+    """Answer 409 where something is to be put into the example, with which it would be deleted."""
+    if id == example_id(group):
+        fault = {"field": field, "found": "the example", "allowed": f"a {field} of your own"}
+        raise Problem(409, f"the example {field} takes no data of your own: they would be deleted with it", [fault])
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,16 +10,15 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import StrEnum
 
 from rcsa_ident.errors import InputError, finite
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, RemarkCode
 from rcsa_ident.units import from_rpm
 
 _UNIT = re.compile("_(rpm|mm|um|mpa|n_per_mm|deg|hz|kw|nm)$")
 
 
-class PlausibilityCode(StrEnum):
+class PlausibilityCode(RemarkCode):
     """What a remark on somebody's input is about."""
 
     UNUSUAL = "unusual"

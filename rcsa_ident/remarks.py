@@ -7,6 +7,10 @@ from enum import StrEnum
 from typing import Any, NoReturn
 
 
+class RemarkCode(StrEnum):
+    """What a remark is about: the base of the enumerations of those that speak, as `RecordCode` and `IdentificationCode`."""
+
+
 class Remark(str):
     """A sentence that also says what it is about: code decides by the code, never by the words.
 
@@ -14,15 +18,14 @@ class Remark(str):
 
     Parameters
     ----------
-    code : StrEnum
-        A member of the enumeration of those that speak: `RecordCode`, `IdentificationCode`.
+    code : RemarkCode
     sentence : str
     """
 
     __slots__ = ("code",)
-    code: StrEnum
+    code: RemarkCode
 
-    def __new__(cls, code: StrEnum, sentence: str) -> Remark:
+    def __new__(cls, code: RemarkCode, sentence: str) -> Remark:
         """Return the sentence with its code."""
         remark = super().__new__(cls, sentence)
         object.__setattr__(remark, "code", code)
@@ -32,7 +35,7 @@ class Remark(str):
         """Refuse: a remark is frozen."""
         raise AttributeError(f"a remark is frozen: {name}")
 
-    def __reduce__(self) -> tuple[type[Remark], tuple[StrEnum, str]]:
+    def __reduce__(self) -> tuple[type[Remark], tuple[RemarkCode, str]]:
         """Pickle and copy with the code."""
         return type(self), (self.code, str(self))
 
@@ -41,7 +44,7 @@ class Remark(str):
         return type(self)(self.code, f"{whom}: {self}")
 
 
-def says(remarks: Iterable[Remark], code: StrEnum) -> bool:
+def says(remarks: Iterable[Remark], code: RemarkCode) -> bool:
     """Return whether one of the remarks has this code."""
     return any(remark.code is code for remark in remarks)
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import copy
 import json
 import pickle
-from enum import StrEnum
 
 import pytest
 
-from rcsa_ident.remarks import Remark, says
+from rcsa_ident.remarks import Remark, RemarkCode, says
 
 
-class Code(StrEnum):
+class Code(RemarkCode):
     ONE = "one"
     TWO = "two"
 

@@ -22,7 +22,7 @@ from api.schemas.keys import KeyAnswer, MadeKey
 from api.schemas.learning import LearnAnswer
 from api.schemas.libraries import Example, ExampleCampaign, Examples, ImportAnswer
 from api.schemas.listening import ListenAnswer, TapAnswer
-from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
+from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, MachineContents, Modes
 from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
 from api.schemas.ringing import RingAnswer
@@ -57,9 +57,13 @@ class Client(Uploads, Jobs):
         """Yield all machines."""
         return self.all("/machines", Page[MachineAnswer], limit)
 
-    def forget_machine(self, id: str) -> None:
-        """Delete a machine and its identification."""
-        self.send("DELETE", f"/machines/{id}")
+    def machine_contents(self, id: str) -> MachineContents:
+        """Return what is deleted with a machine."""
+        return read(MachineContents, self.send("GET", f"/machines/{id}/contents"))
+
+    def forget_machine(self, id: str, seen: str | None = None) -> None:
+        """Delete a machine, its identification and its campaigns; `seen` is the etag of the contents that were looked at."""
+        self.send("DELETE", f"/machines/{id}", headers=match(seen))
 
     def identify(self, id: str, result: str | bytes, seen: str | None = None) -> IdentificationSummary:
         """Write what is known of a machine (content of RESULT.json or FLANGE.csv); `seen` is the etag of what it replaces."""
@@ -253,9 +257,9 @@ class Client(Uploads, Jobs):
         """Make the example machine with its campaign, whose recordings follow; or what is missing of them."""
         return read(ExampleCampaign, self.send("POST", "/examples/campaign"))
 
-    def forget_example(self) -> None:
-        """Delete the example machine with its campaign and its toolings."""
-        self.send("DELETE", "/examples/campaign")
+    def forget_example(self, own: bool = False, seen: str | None = None) -> None:
+        """Delete the example machine with its campaign and its toolings, with `own` also campaigns of one's own on it."""
+        self.send("DELETE", "/examples/campaign", params={"own": own}, headers=match(seen))
 
     def forget_tooling(self, name: str, seen: str | None = None) -> None:
         """Delete a tooling."""

@@ -15,36 +15,44 @@ import numpy as np
 
 from rcsa_ident.remarks import Remark
 
-#: Module and name of every noun that may be written; a later release may read what an earlier one wrote as long as its fields stay.
-NOUNS = (
-    "rcsa_ident.dynamics.coordinates.Dof",
-    "rcsa_ident.remarks.Remark",
-    "rcsa_ident.signals.verdict.RecordCode",
-    "rcsa_ident.signals.verdict.Verdict",
-    "rcsa_ident.signals.frf.AxisLines",
-    "rcsa_ident.signals.measurement.CutMeasurement",
-    "rcsa_ident.signals.measurement.Reading",
-    "rcsa_ident.identification.parameters.AxisLayout",
-    "rcsa_ident.identification.parameters.Layout",
-    "rcsa_ident.identification.candidate.Candidate",
-    "rcsa_ident.identification.coupled.fit.CoupledSearch",
-    "rcsa_ident.identification.coupled.parameters.CoupledLayout",
-    "rcsa_ident.identification.progress.Stage",
-    "rcsa_ident.identification.progress.Step",
-    "rcsa_ident.identification.joint_fit.AxisSearch",
-    "rcsa_ident.cutting.conditions.Engagement",
-    "rcsa_ident.cutting.conditions.Block",
-    "rcsa_ident.cutting.conditions.Stepover",
-    "rcsa_ident.cutting.conditions.EngagementMap",
-    "rcsa_ident.cutting.stock.Immersion",
-    "rcsa_ident.cutting.process.ProcessDamping",
-    "api.work.requests.MachineText",
-    "rcsa_ident.machining_setup.CutSpec",
-    "api.work.requests.ToolingSource",
-    "api.work.requests.LobeRequest",
-    "api.work.paths.PathRequest",
-)
-_PLACES = {place.rpartition(".")[2]: place for place in NOUNS}
+#: Places of all nouns that may be written, by the names under which they are stored. A name stays for ever, since jobs outlive an upgrade:
+#: where a class moves or is renamed, its place alone follows. Texts of an earlier release can be read as long as the fields stay.
+NOUNS = {
+    "Dof": "rcsa_ident.dynamics.coordinates.Dof",
+    "Remark": "rcsa_ident.remarks.Remark",
+    "RecordCode": "rcsa_ident.signals.verdict.RecordCode",
+    "IdentificationCode": "rcsa_ident.identification.result.IdentificationCode",
+    "PlausibilityCode": "rcsa_ident.plausibility.PlausibilityCode",
+    "FlangeCode": "rcsa_ident.machine.measured.FlangeCode",
+    "CutterCode": "rcsa_ident.cutting.shape.CutterCode",
+    "RobotCode": "rcsa_ident.identification.posed.result.RobotCode",
+    "Verdict": "rcsa_ident.signals.verdict.Verdict",
+    "AxisLines": "rcsa_ident.signals.frf.AxisLines",
+    "CutMeasurement": "rcsa_ident.signals.measurement.CutMeasurement",
+    "Reading": "rcsa_ident.signals.measurement.Reading",
+    "AxisLayout": "rcsa_ident.identification.parameters.AxisLayout",
+    "Layout": "rcsa_ident.identification.parameters.Layout",
+    "Candidate": "rcsa_ident.identification.candidate.Candidate",
+    "CoupledSearch": "rcsa_ident.identification.coupled.fit.CoupledSearch",
+    "CoupledLayout": "rcsa_ident.identification.coupled.parameters.CoupledLayout",
+    "PosedLayout": "rcsa_ident.identification.posed.parameters.PosedLayout",
+    "Stage": "rcsa_ident.identification.progress.Stage",
+    "Step": "rcsa_ident.identification.progress.Step",
+    "AxisSearch": "rcsa_ident.identification.joint_fit.AxisSearch",
+    "Engagement": "rcsa_ident.cutting.conditions.Engagement",
+    "Block": "rcsa_ident.cutting.conditions.Block",
+    "Stepover": "rcsa_ident.cutting.conditions.Stepover",
+    "EngagementMap": "rcsa_ident.cutting.conditions.EngagementMap",
+    "Immersion": "rcsa_ident.cutting.stock.Immersion",
+    "ProcessDamping": "rcsa_ident.cutting.process.ProcessDamping",
+    "SpeedVariation": "rcsa_ident.cutting.process.SpeedVariation",
+    "MachineText": "api.work.requests.MachineText",
+    "CutSpec": "rcsa_ident.machining_setup.CutSpec",
+    "ToolingSource": "api.work.requests.ToolingSource",
+    "LobeRequest": "api.work.requests.LobeRequest",
+    "PathRequest": "api.work.paths.PathRequest",
+}
+_NAMES = {place: name for name, place in NOUNS.items()}
 
 
 class Unknown(ValueError):
@@ -153,15 +161,15 @@ def _array_of(content: list[Any]) -> np.ndarray:
 
 
 def _name(kind: type) -> str:
-    name = kind.__name__
-    if _PLACES.get(name) != f"{kind.__module__}.{name}":
-        raise Unknown(f"a {name} is none of the known nouns")
+    name = _NAMES.get(f"{kind.__module__}.{kind.__qualname__}")
+    if name is None:
+        raise Unknown(f"a {kind.__name__} is none of the known nouns")
     return name
 
 
 @cache
 def _noun(name: str) -> Any:
-    place = _PLACES.get(name)
+    place = NOUNS.get(name)
     if place is None:
         raise Unknown(f"{name[:40]} is none of the known nouns")
     module, _, own = place.rpartition(".")

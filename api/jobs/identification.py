@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import time
 from collections.abc import Callable, Iterable
@@ -36,8 +37,11 @@ from rcsa_ident.signals.measurement import Reading, among_fellows
 from rcsa_ident.units import to_hz
 from rcsa_ident.workflows.identify import ReadCut, ReadTest, data_of, hammer_lines, judge_cut, left_out, mode_deviations, of_campaign
 
+log = logging.getLogger("rcsa_ident.jobs")
 #: Returns a campaign of a group, what reads its cuts and what reads its hammer tests.
 Load = Callable[[str, str], tuple[Campaign, ReadCut, ReadTest]]
+#: Said by a job whose result is there, beside it.
+NO_REPORT = "an internal error occurred while the report was written; it is logged under this job's id"
 #: Cuts that are judged in one step, and points of a curve.
 CHUNK, POINTS = 4, 300
 
@@ -75,8 +79,14 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
         content["started_from"] = digest_of(start)
     check_result(content, "")
     text = layout(content) + "\n"
-    texts = {"result": text, "frf": json.dumps(_lines(found, campaign)), "report": _report(found, campaign, readings, deviations)}
+    texts = {"result": text, "frf": json.dumps(_lines(found, campaign))}
     applied, problem = _applied(text) if request["apply"] else (None, None)
+    try:
+        texts["report"] = _report(found, campaign, readings, deviations)
+    except Exception as error:
+        # the work is done, and its result is more than a picture of it
+        log.error("a report cannot be written", exc_info=error)
+        problem = problem or json.dumps({"detail": NO_REPORT, "errors": []})
     context.progress("result", 1, 1)
     return Outcome("done", "", status=str(found.status), texts=texts, applied=applied, problem=problem)
 

@@ -102,15 +102,15 @@ class JobContext:
         Faulty
             The step has raised something else.
         Outdated
-            It is remembered, but by another version of the service.
+            It is remembered, but by another version of the service, or in a form that cannot be read.
         """
         self.check()
-        computed = False
+        computed: dict[str, Any] | None = None
 
         def outcome() -> str:
             nonlocal computed
-            computed = True
-            return self._outcome(name, compute)
+            computed = self._outcome(name, compute)
+            return _text(computed)
 
         try:
             text = self.engine(name, outcome)
@@ -119,16 +119,19 @@ class JobContext:
             log.error("the durable engine has refused a step", exc_info=error, extra={"fields": {"step": name}})
             self.leave(3)
             raise Stopped from error
-        if computed and self.resumed:
+        if computed is not None and self.resumed:
             self._add(Event(0, "note", json.dumps({"text": STARTS_OVER})))
         self.resumed = False
         found = _read(text)
         if found is None:
-            if computed:
-                log.error("a step cannot be read back", extra={"fields": {"step": name}})
-                raise Faulty(name)
-            log.warning("remembered by another version", extra={"fields": {"step": name}})
-            raise Outdated(name)
+            if computed is None:
+                log.warning("remembered by another version, or not at all", extra={"fields": {"step": name}})
+                raise Outdated(name)
+            # the work is done and its result in hand: only if the process dies has the job to start over
+            log.error("a step cannot be read back", extra={"fields": {"step": name}})
+            found = computed
+        elif computed is not None and "value" in found:
+            self.came_further = True
         if "refused" in found:
             raise InputError(*found["refused"])
         if "value" not in found:
@@ -136,19 +139,17 @@ class JobContext:
             raise Faulty(name)
         return found["value"]
 
-    def _outcome(self, name: str, compute: Callable[[], Any]) -> str:
+    def _outcome(self, name: str, compute: Callable[[], Any]) -> dict[str, Any]:
         # the engine stores results only: it would restore exceptions by rules of its own
         try:
-            text = _text(value=compute())
-            self.came_further = True
-            return text
+            return {"value": compute()}
         except InputError as error:
-            return _text(refused=(error.field, str(error.found), error.allowed, error.where))
+            return {"refused": (error.field, str(error.found), error.allowed, error.where)}
         except Stopped:
-            return _text()
+            return {}
         except Exception as error:
             log.error("a step has failed", exc_info=error, extra={"fields": {"step": name}})
-            return _text()
+            return {}
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any], name: str, stage: str, spread: Map = map) -> list[Any]:
         """Return the results of all tasks in order, each a step of its own.
@@ -238,9 +239,13 @@ class JobContext:
                 time.sleep(1.0)
 
 
-def _text(**outcome: Any) -> str:
-    """Return what a step came to, with the version that says so."""
-    return encode({"version": VERSION, **outcome})
+def _text(outcome: dict[str, Any]) -> str:
+    """Return what a step came to, with the version that says so; what cannot be encoded is of none."""
+    try:
+        return encode({"version": VERSION, **outcome})
+    except Unknown as error:
+        log.error("a step cannot be stored", exc_info=error)
+        return encode({"version": ""})
 
 
 def _read(text: str) -> dict[str, Any] | None:

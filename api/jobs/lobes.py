@@ -81,9 +81,14 @@ def carry(job: Job, context: JobContext) -> Outcome:
     known = [_Known(context, question.speeds, tooling.name, i, len(toolings)) for i, tooling in enumerate(toolings)]
     for i, tooling in enumerate(toolings):
         known[i].progress()
-        found.append(context.remember(f"lobes.{i}", partial(guarded, tasks.lobes, machine, tooling, question, known[i])))
+        found.append(context.remember(f"lobes.{i}", partial(_answered, machine, tooling, question, known[i])))
     context.progress(STAGE, len(toolings) * len(question.speeds), len(toolings) * len(question.speeds))
     return Outcome("done", "", texts={"answer": json.dumps({"machine": _called(job), "toolings": found}, allow_nan=False)})
+
+
+def _answered(machine: MachineText, tooling: ToolingSource, question: LobeRequest, watch: _Known) -> Any:
+    """The lobes of a tooling, as plain as an answer at once has them: no word of the library is to be remembered beside them."""
+    return json.loads(json.dumps(guarded(tasks.lobes, machine, tooling, question, watch), allow_nan=False))
 
 
 def _called(job: Job) -> str:

@@ -13,7 +13,7 @@ from api.files import Full, TooLarge
 from api.reading.campaign_text import declare
 from api.reading.uploads import Uploads, received
 from api.stores.campaigns import Campaign
-from api.stores.entities import Taken, Unavailable
+from api.stores.entities import Taken, Unavailable, digest_of
 from api.work import examples
 from api.work.pool import Busy, Work
 from rcsa_ident.errors import InputError
@@ -32,6 +32,11 @@ _PAUSE = 1.0
 def example_id(group: str) -> str:
     """Return the id of a group's example machine and of its campaign, which tells that they are examples."""
     return f"example{hashlib.sha256(group.encode()).hexdigest()[:17]}"
+
+
+def example_tooling(name: str) -> str:
+    """Return the name of an example's tooling in the library."""
+    return f"Example {name}"
 
 
 class Examples:
@@ -57,6 +62,17 @@ class Examples:
             return Campaign(example_id(group), group, example_id(group), f"Example: {name}", declared, cuts, created)
 
         return await asyncio.to_thread(declare_it), toolings
+
+    async def untouched(self, group: str) -> dict[str, str]:
+        """Return the example's toolings in the library that nobody has changed, with their digests: they go with it."""
+        _, texts = await self.work.run(examples.plan)
+        written = {example_tooling(name): digest_of(text) for name, text in texts.items()}
+
+        def look() -> dict[str, str]:
+            kept = {name: self.uploads.store.toolings.get(group, name) for name in written}
+            return {name: document.digest for name, document in kept.items() if document is not None and document.digest == written[name]}
+
+        return await asyncio.to_thread(look)
 
     def fill(self, campaign: Campaign) -> None:
         """Make what is missing of the campaign's recordings, unless that is under way."""

@@ -14,9 +14,10 @@ from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
 from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, in_use, page, problems, utf8
-from api.lookups import known_campaign, machine_of
+from api.lookups import known_campaign, machine_of, refuse_example
 from api.problems import Problem
 from api.reading.campaign_text import HAMMER, LARGEST, campaign_of_text, declare, files_of, toml_text
+from api.reading.example_campaign import example_id
 from api.reading.stored import found_of, upload_of
 from api.reading.uploads import refused_verdict
 from api.schemas.campaigns import (
@@ -55,7 +56,7 @@ _BODY = {
     "/machines/{id}/campaigns",
     status_code=201,
     summary="Make a campaign from campaign.toml, or from its keys as JSON",
-    description="Toolings are copied: later changes of the library do not affect the campaign. "
+    description="Toolings are copied: later changes of the library do not affect the campaign. The example machine takes none. "
     "Recordings are named by the last parts of their paths.",
     openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
     responses=problems(404, 409, *BODY),
@@ -70,6 +71,7 @@ async def make(
 
     def keep() -> Campaign:
         machine_of(components, caller.group, id)
+        refuse_example("machine", id, caller.group)
         data = parsed(utf8(raw)) if is_toml else body_of(NewCampaign, raw).model_dump(exclude_unset=True, exclude_none=True)
         name, text, cuts = declare(data, lambda name: _tooling(components, caller.group, name))
         campaign = Campaign(new_id(), caller.group, id, name, text, cuts, now())
@@ -173,6 +175,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         machine=campaign.machine,
         name=campaign.name,
         created=campaign.created,
+        example=campaign.id == example_id(campaign.group),
         sampling_rate_hz=data.get("campaign", {}).get("sampling_rate_hz"),
         sensors=data["sensors"],
         workpiece=data.get("workpiece", {}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
@@ -18,6 +18,7 @@ from api.conventions import (
     Repeat,
     Why,
     expected,
+    found_or_404,
     guard,
     in_use,
     page,
@@ -31,7 +32,7 @@ from api.lookups import identification_of, known_machine, machine_of
 from api.problems import Problem
 from api.reading.example_campaign import example_id
 from api.schemas.common import Page
-from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes, NewMachine
+from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, MachineContents, Modes, NewMachine
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.entities import Document, Machine, Stale, Taken, digest_of
 from api.stores.entities import summary_of as stored_summary
@@ -71,15 +72,30 @@ def get(id: MachineId, components: ThisService, caller: WhoAsks) -> MachineAnswe
     return _answer(components, machine_of(components, caller.group, id))
 
 
+@router.get(
+    "/{id}/contents",
+    summary="What is deleted with a machine: its identification, campaigns and recordings by name, toolings of an example",
+    openapi_extra=guard("read"),
+    responses=problems(404, 422),
+)
+async def contents(id: MachineId, response: Response, components: ThisService, caller: WhoAsks) -> MachineContents:
+    there = found_or_404(await contents_of(components, caller.group, id), "machine")
+    response.headers.update(tagged(there.etag))
+    return there
+
+
 @router.delete(
     "/{id}",
     status_code=204,
     summary="Delete a machine, its identification and its campaigns",
+    description="With the entity tag of its contents in If-Match nothing goes that was not among them.",
     openapi_extra=guard("upload"),
-    responses=problems(404, 422),
+    responses=problems(404, 412, 422),
 )
-def forget(id: MachineId, components: ThisService, caller: WhoAsks, why: Why = "") -> Response:
-    if not components.uploads.forget_machine(caller.group, id, caller.note(why)):
+async def forget(id: MachineId, request: Request, components: ThisService, caller: WhoAsks, why: Why = "") -> Response:
+    if "if-match" in request.headers and (there := await contents_of(components, caller.group, id)) is not None:
+        unseen(request, there)
+    if not await run_in_threadpool(components.uploads.forget_machine, caller.group, id, caller.note(why)):
         raise Problem(404, "there is no such machine")
     return Response(status_code=204)
 
@@ -155,6 +171,40 @@ async def frf(
     machine = await run_in_threadpool(known_machine, components, caller.group, id)
     found = components.work.run(tasks.flange_frf, machine, (from_hz, to_hz, step_hz), components.settings.work_seconds)
     return Frf.model_validate(await while_there(request, found))
+
+
+async def contents_of(components: Components, group: str, id: str) -> MachineContents | None:
+    """Return what goes with a machine; None where there is no such machine."""
+    example = id == example_id(group)
+
+    def look() -> tuple[dict[str, Any], str] | None:
+        machine = components.store.machines.get(group, id)
+        if machine is None:
+            return None
+        known = components.store.identifications.brief(group, id)
+        campaigns = []
+        for campaign in components.store.campaigns.list(group, id, "", 1_000_000):
+            rows = components.store.recordings.list(group, campaign.id, "", 1_000_000)
+            told = {"id": campaign.id, "name": campaign.name, "example": campaign.id == example_id(group)}
+            campaigns.append(told | {"recordings": [row.name for row in rows], "size_bytes": sum(row.size for row in rows)})
+        status = None if known is None else stored_summary(known)["status"]
+        told = {"id": id, "name": machine.name, "example": example, "identification": status, "campaigns": campaigns}
+        return told, "" if known is None else known.digest
+
+    found = await run_in_threadpool(look)
+    if found is None:
+        return None
+    told, digest = found
+    told["toolings"] = sorted(await components.examples.untouched(group)) if example else []
+    # what the virtual machine makes meanwhile changes nothing that anybody would miss
+    own = [each for each in told["campaigns"] if not each["example"]]
+    return MachineContents(**told, etag=digest_of(json.dumps([told | {"campaigns": own}, digest])))
+
+
+def unseen(request: Request, there: MachineContents) -> None:
+    """Refuse to delete what was not among the contents that the caller has seen."""
+    if expected(request, lambda: there.etag) not in (None, there.etag):
+        raise Problem(412, "the machine holds something else than what was looked at: look again at what is deleted with it")
 
 
 def _digest(document: Document | None) -> str | None:

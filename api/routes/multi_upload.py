@@ -8,7 +8,7 @@ from fastapi.concurrency import run_in_threadpool
 from api.components import Components, ThisService
 from api.conventions import BODY, CampaignId, guard, problems
 from api.files import Part
-from api.lookups import known_campaign
+from api.lookups import own_campaign
 from api.problems import Problem, of_input, of_room
 from api.reading.campaign_text import files_of
 from api.routes.recordings import answer, take
@@ -41,10 +41,10 @@ _FORM = {
     summary="Upload several recordings",
     description="Each file is a part of the form, whose file name is named by the campaign. A refused file does not affect the others.",
     openapi_extra=guard("upload", requestBody=_FORM, **{"x-content-types": (FORM,)}),
-    responses=problems(404, 408, *BODY),
+    responses=problems(404, 408, 409, *BODY),
 )
 async def post(id: CampaignId, request: Request, components: ThisService, caller: WhoAsks, replace: bool = False) -> UploadAnswer:
-    campaign = await run_in_threadpool(known_campaign, components, caller.group, id)
+    campaign = await run_in_threadpool(own_campaign, components, caller.group, id)
     refuse_encoded(request)
     known = files_of(campaign.text)
     with components.uploads.admitted(caller.group):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -11,7 +12,7 @@ from fastapi.responses import FileResponse
 
 from api.components import Components, ThisService
 from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, problems, tagged, unchanged, while_there
-from api.lookups import known_campaign
+from api.lookups import known_campaign, own_campaign
 from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import HAMMER, File, files_of
@@ -68,7 +69,7 @@ async def put(
     caller: WhoAsks,
     replace: Replace = False,
 ) -> RecordingAnswer:
-    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name, own_campaign)
     digest = announced_digest(request, "Repr-Digest", "Content-Digest")
     refuse_encoded(request)
     with components.uploads.admitted(caller.group):
@@ -170,9 +171,11 @@ def _form(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def named(components: Components, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
-    """Return a campaign and a recording that it names."""
-    campaign = known_campaign(components, group, id)
+def named(
+    components: Components, group: str, id: str, name: str, of: Callable[[Components, str, str], Campaign] = known_campaign
+) -> tuple[Campaign, str, File]:
+    """Return a campaign and a recording that it names; of `own_campaign` where that is to be written."""
+    campaign = of(components, group, id)
     found = files_of(campaign.text).get(_form(name))
     if found is None:
         raise Problem(404, "the campaign does not name this recording")

@@ -17,6 +17,7 @@ from starlette.exceptions import HTTPException
 from api.components import Components, ThisService
 from api.conventions import BODY, CampaignId, guard, problems, tagged
 from api.files import Part, Partial
+from api.lookups import own_campaign
 from api.problems import Problem
 from api.reading.stored import is_whole
 from api.reading.uploads import partial_name
@@ -94,7 +95,7 @@ async def patch(
     length: Length = None,
     replace: Replace = False,
 ) -> Any:
-    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name, own_campaign)
     whole, content = announced_digest(request, "Repr-Digest"), announced_digest(request, "Content-Digest")
     checksum = None if content is None else Checksum("sha256", content, partial(check_digest, header="Content-Digest"))
     done = await receive(request, components, campaign, name, Upload(offset, length, replace, whole), checksum)

@@ -19,6 +19,7 @@ from starlette.types import Scope
 from api.components import Components, ThisService
 from api.conventions import CampaignId, guard, problems
 from api.files import Partial
+from api.lookups import own_campaign
 from api.problems import Problem, of_input, of_validation
 from api.reading.uploads import partial_name
 from api.routes.recordings import RecordingName, named
@@ -141,7 +142,7 @@ async def create(
     told = _metadata(metadata)
     if "filename" not in told:
         raise InputError("Upload-Metadata", metadata[:80], "a filename: its name in the campaign, in Base64")
-    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, told["filename"])
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, told["filename"], own_campaign)
     await check_room(components, caller.group, length)
     replacing = told.get("replace", "") not in ("", "false", "0")
     state = Partial(0, length, caller.group, campaign.id, name, replacing, _digest(told.get("sha256", "")))

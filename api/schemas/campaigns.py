@@ -225,6 +225,7 @@ class CampaignAnswer(Answer):
     machine: str
     name: str
     created: str
+    example: bool = Field(description="Whether the virtual machine makes its recordings; it takes no others.")
     sampling_rate_hz: float | None
     sensors: dict[str, dict[str, Any]]
     workpiece: dict[str, Any] = Field(description="Empty where hammer tests alone tell none.")

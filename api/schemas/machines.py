@@ -29,6 +29,28 @@ class MachineAnswer(Answer):
     identification: IdentificationSummary | None = Field(description="null where the machine has not been identified.")
 
 
+class CampaignContents(Answer):
+    """What is deleted with a campaign."""
+
+    id: str
+    name: str
+    example: bool = Field(description="Whether the virtual machine made it.")
+    recordings: list[str] = Field(description="Names of the files that were uploaded for it.")
+    size_bytes: int
+
+
+class MachineContents(Answer):
+    """What is deleted with a machine."""
+
+    id: str
+    name: str
+    example: bool = Field(description="Whether it is the example.")
+    identification: str | None = Field(description="Its status; null where there is none.")
+    campaigns: list[CampaignContents]
+    toolings: list[str] = Field(description="Toolings of the example that nobody has changed; empty for other machines.")
+    etag: str
+
+
 class IdentificationSummary(Answer):
     """Summary of an identification."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, RemarkCode
 
 
 class CutterShape(StrEnum):
@@ -33,7 +33,7 @@ class CutterShape(StrEnum):
         return self in (CutterShape.RADIUS, CutterShape.PROFILE) or corner_radius <= 0.5005 * diameter
 
 
-class CutterCode(StrEnum):
+class CutterCode(RemarkCode):
     """What may be said of a cutter."""
 
     AS_CYLINDER = "computed-as-a-cylinder"

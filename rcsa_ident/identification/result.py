@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.machining_setup import Workpiece
-from rcsa_ident.remarks import Remark, says
+from rcsa_ident.remarks import Remark, RemarkCode, says
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.recording import Sensor
@@ -32,7 +31,7 @@ from rcsa_ident.tool_holder.drawings import KnownToolings
 from rcsa_ident.tool_holder.learned import LearnedValue
 
 
-class IdentificationCode(StrEnum):
+class IdentificationCode(RemarkCode):
     """What may be said of an identification: why it has failed, reasons for doubt, and what the data cannot tell."""
 
     NO_FINITE_FIT = "no-finite-fit"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -11,14 +10,14 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, RemarkCode
 
 #: Estimated relative error of the interpolation from which on the measured grid is called coarse, and the share of the frequencies that
 #: are asked for at which it has to be: a narrow antiresonance alone changes no limit.
 COARSE, COARSE_SHARE = 0.02, 0.01
 
 
-class FlangeCode(StrEnum):
+class FlangeCode(RemarkCode):
     """What may be said of a measured flange."""
 
     COARSE = "coarse"

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, RemarkCode
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.channel_scan import scan
 from rcsa_ident.signals.recording import Quantity, Recording
@@ -37,7 +36,7 @@ DRIFT_PHASE = 0.5
 MOST_WANDER = 0.003
 
 
-class RecordCode(StrEnum):
+class RecordCode(RemarkCode):
     """What may be said of a record; the last nine speak of one that may be used."""
 
     UNREADABLE = "unreadable"

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
+import pkgutil
+from abc import ABC
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from enum import Enum
+from enum import Enum, StrEnum
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
@@ -13,11 +20,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from api.jobs import codec
+import api
+import rcsa_ident
+from api.jobs import codec, identification, lobes, paths
 from api.jobs.codec import NOUNS, Unknown, _noun, decode, encode
-from api.work.requests import LobeRequest
+from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.cutting.process import ProcessDamping
+from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.coupled.fit import CoupledSearch
@@ -25,8 +34,11 @@ from rcsa_ident.identification.coupled.parameters import EVERY_PAIR, CoupledLayo
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.progress import Stage, Step
+from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.identification.task import Phase
 from rcsa_ident.machining_setup import CutSpec
-from rcsa_ident.remarks import Remark
+from rcsa_ident.plausibility import PlausibilityCode
+from rcsa_ident.remarks import Remark, RemarkCode
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])
@@ -116,16 +128,102 @@ def test_what_a_search_of_both_planes_has_come_to(skew):
 
 
 def test_a_question():
-    cut = CutSpec(Engagement(0.5, 3.0), 0.25, None, "steel", {"tangential": 9.02e8}, (1e-6, 0.0), ProcessDamping(1e14, 1e-4, 0.3))
+    swing = SpeedVariation(0.1, 0.2)
+    cut = CutSpec(Engagement(0.5, 3.0), 0.25, None, "steel", {"tangential": 9.02e8}, (1e-6, 0.0), ProcessDamping(1e14, 1e-4, 0.3), swing)
     question = LobeRequest(cut, (418.87902047863909, 500.0), 0.01, "semi-discretisation", True, 0.0005, 20.0)
     assert same(question, decode(encode(question)))
 
 
+@cache
+def classes():
+    """All classes of both packages."""
+    found = set()
+    for package in (rcsa_ident, api):
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if ".migrations." not in module.name:
+                members = vars(importlib.import_module(module.name)).values()
+                found |= {each for each in members if isinstance(each, type) and each.__module__.startswith(("rcsa_ident.", "api."))}
+    return found
+
+
+def below(base):
+    """Those of them that derive from one, a protocol included."""
+    return {each for each in classes() if base in each.__mro__[1:]}
+
+
+def test_a_remark_of_every_code():
+    codes = below(RemarkCode)
+    assert codes >= {IdentificationCode, PlausibilityCode, RecordCode}
+    # whoever names a code as one has the base of all codes
+    assert codes == {each for each in below(StrEnum) if each.__name__.endswith("Code") and each is not RemarkCode}
+    for code in (each for kind in codes for each in kind):
+        remark = Remark(code, f"{code} in words")
+        assert same([remark], decode(encode([remark])))
+
+
+#: What is written without a noun. Of mappings and sequences those are that a question or an answer is made with; `Any` stands for JSON.
+PLAIN = {NoneType, bool, int, float, complex, str, np.ndarray, list, tuple, dict, Mapping, Sequence, Any, Ellipsis, Union, UnionType}
+
+
+def reached(kind: Any, seen: set[Any]) -> set[Any]:
+    """All types that a value may hold, by the annotations of its class, of those below it and of their fields."""
+    for part in get_args(kind):
+        reached(part, seen)
+    kind = get_origin(kind) or kind
+    if kind not in seen and kind is not np.dtype:
+        seen.add(kind)
+        hints = get_type_hints(kind) if is_dataclass(kind) else {}
+        inside = [hints[field.name] for field in fields(kind)] if hints else []
+        for each in (*inside, *(below(kind) if kind in classes() else ())):
+            reached(each, seen)
+    return seen
+
+
+def test_all_that_jobs_are_asked_and_remember_is_known():
+    """Questions of lobes and paths, judged recordings, and what every task of an identification comes to."""
+    tasks = {each for each in classes() if isinstance(getattr(each, "phase", None), Phase)}
+    assert len(tasks) >= 8
+    roots = [get_type_hints(task.run)["return"] for task in tasks]
+    roots += [hint for function in (lobes.asked, paths.asked) for hint in get_type_hints(function).values()]
+    roots += [get_type_hints(identification._readings)["return"]]
+    found = set[Any]()
+    for root in roots:
+        reached(root, found)
+    assert {AxisSearch, CoupledSearch, Candidate, CutSpec, LobeRequest, Verdict} <= found
+    values = {each for each in found - PLAIN if not (getattr(each, "_is_protocol", False) or issubclass(each, ABC))}
+    assert values - {_noun(name) for name in NOUNS} == set()
+
+
 def test_every_known_noun_is_a_frozen_one_or_a_name_of_something():
-    for place in NOUNS:
-        noun = _noun(place.rpartition(".")[2])
+    for name, place in NOUNS.items():
+        noun = _noun(name)
         assert f"{noun.__module__}.{noun.__name__}" == place
         assert issubclass(noun, Enum | Remark) or noun.__dataclass_params__.frozen
+
+
+#: Under which jobs in databases hold their nouns since 0.2.0, whatever the classes are called now and wherever they are.
+STORED = (
+    "Dof", "Remark", "RecordCode", "Verdict", "AxisLines", "CutMeasurement", "Reading", "AxisLayout", "Layout", "Candidate",
+    "CoupledSearch", "CoupledLayout", "Stage", "Step", "AxisSearch", "Engagement", "Block", "Stepover", "EngagementMap", "Immersion",
+    "ProcessDamping", "MachineText", "CutSpec", "ToolingSource", "LobeRequest", "PathRequest",
+)  # fmt: skip
+
+
+def test_a_name_under_which_a_noun_was_stored_stays():
+    assert set(STORED) - NOUNS.keys() == set()
+
+
+def test_a_job_of_the_first_release_is_read():
+    """As it waits in a database: a machine, its toolings and what is asked of them."""
+    text = """{"~tuple":[{"~MachineText":{"digest":"d","text":"{}"}},
+    {"~tuple":[{"~ToolingSource":{"name":"T1","text":"[cutter]","keys":null}}]},{"~LobeRequest":{"cut":{"~CutSpec":{"engagement":{"~Engagement":{"entry":0.5,"exit":3.0}},"feed_angle":0.25,"feed_per_tooth":null,
+    "material":"steel","coefficients":{"~table":[["tangential",902000000.0]]},"runout":{"~tuple":[1e-06,0.0]},"damping":null}},
+    "speeds":{"~tuple":[418.8790204786391]},"max_depth":0.01,"method":"zero-order","bands":true,"stiffness_spread":0.0005,
+    "work_seconds":20.0,"recommend":true,"tested":{"~tuple":[]}}}]}"""
+    machine, toolings, question = decode(text)
+    cut = CutSpec(Engagement(0.5, 3.0), 0.25, None, "steel", {"tangential": 9.02e8}, (1e-6, 0.0))
+    assert same(question, LobeRequest(cut, (418.8790204786391,), 0.01, "zero-order", True, 0.0005, 20.0))
+    assert same((machine, toolings), (MachineText("d", "{}"), (ToolingSource("T1", "[cutter]"),)))
 
 
 @dataclass(frozen=True)
@@ -176,7 +274,7 @@ def test_nothing_else_comes_out(text):
 def test_a_noun_whose_place_is_gone_is_unknown(monkeypatch):
     """Another version may have named a module that this one does not have."""
     for place in ("rcsa_ident.nowhere.Dof", "rcsa_ident.errors.Dof"):
-        monkeypatch.setitem(codec._PLACES, "Dof", place)
+        monkeypatch.setitem(NOUNS, "Dof", place)
         codec._noun.cache_clear()
         with pytest.raises(Unknown):
             decode('{"~enum": ["Dof", "x"]}')

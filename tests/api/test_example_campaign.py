@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
+from dataclasses import replace
+
 import pytest
 
 from api.client import Client
 from api.reading.example_campaign import LARGEST, MACHINE
 from rcsa_ident.samples import SAMPLE_CUTS, sample_machine, sample_toolings
+from tests.api.identifying import declared, files, uploaded
 from tests.api.in_process import refused, service
 from tests.fixtures.waiting import until
 
@@ -56,6 +60,55 @@ def test_what_is_missing_is_made_when_it_is_asked_again(client):
     after = {each.name: each.sha256 for each in client.recordings(made.campaign)}
     # the same virtual machine and the same chance, and none of the rest is made again
     assert after == before
+
+
+def test_the_example_takes_nothing_of_ones_own(http, client, monkeypatch):
+    """By no door: it would be deleted with the example."""
+    monkeypatch.setattr(http.app.state.components.examples, "fill", lambda campaign: None)
+    made = client.make_example()
+    name = client.campaign(made.campaign).cuts[0].cut.name
+    path = f"/v1/campaigns/{made.campaign}"
+    tus = {"Tus-Resumable": "1.0.0", "Upload-Length": "3", "Upload-Metadata": f"filename {b64encode(name.encode()).decode()}"}
+    part = {"Upload-Offset": "0", "Upload-Length": "3", "Content-Type": "application/octet-stream"}
+    answers = [
+        client.http.post(f"/v1/machines/{made.machine}/campaigns", json=declared(1)),
+        client.http.put(f"{path}/recordings/{name}?replace=true", content=b"own", headers={"Content-Type": "application/octet-stream"}),
+        client.http.patch(f"{path}/recordings/{name}", content=b"own", headers=part),
+        client.http.post(f"{path}/recordings", files={"files": (name, b"own")}),
+        client.http.post(f"{path}/uploads", headers=tus),
+    ]
+    assert [(answer.status_code, answer.json()["errors"][0]["found"]) for answer in answers] == [(409, "the example")] * 5
+    assert [campaign.id for campaign in client.campaigns(made.machine)] == [made.campaign]
+
+
+def test_what_is_deleted_is_named_before(http, client, monkeypatch):
+    """Machine, campaigns and recordings; what came since then is not deleted with them."""
+    monkeypatch.setattr(http.app.state.components.examples, "fill", lambda campaign: None)
+    made = client.make_example()
+    mine = client.make_machine("Mine").id
+    campaign = uploaded(client, mine, 1)
+    seen = client.machine_contents(mine)
+    assert (seen.name, seen.example, seen.identification, seen.toolings) == ("Mine", False, None, [])
+    (held,) = seen.campaigns
+    assert (held.id, held.example, held.recordings) == (campaign, False, sorted(file.name for file in files(1)))
+    assert held.size_bytes == sum(file.stat().st_size for file in files(1))
+    client.make_campaign(mine, declared(1))
+    refused(412, client.forget_machine, mine, seen.etag)
+    again = client.machine_contents(mine)
+    assert len(again.campaigns) == 2
+    client.forget_machine(mine, again.etag)
+    refused(404, client.machine_contents, mine)
+    # an earlier release took campaigns of one's own on the example: they go where that was said
+    store = http.app.state.components.store
+    theirs = store.campaigns.get("local", made.campaign)
+    store.campaigns.add(replace(theirs, id="mine", name="HPM 800U"))
+    there = client.machine_contents(made.machine)
+    assert [(each.name, each.example) for each in there.campaigns if not each.example] == [("HPM 800U", False)]
+    assert there.toolings == sorted(f"Example {name}" for name in sample_toolings())
+    assert "HPM 800U (0 recordings)" in refused(409, client.forget_example).detail
+    assert client.machine(made.machine).example
+    client.forget_example(own=True)
+    assert list(client.machines()) == []
 
 
 def test_the_example_keeps_to_the_quota(store, tmp_path):

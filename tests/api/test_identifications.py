@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 from api.client import Client
 from api.jobs import identification as work
 from api.jobs.event_feed import Crowded, EventFeeds
+from api.jobs.identification import NO_REPORT
 from api.jobs.job_context import STARTS_OVER, JobContext
 from api.security import new_id, now
 from api.shares import Shares
@@ -152,6 +153,24 @@ def test_a_killed_job_goes_on_and_finds_the_same(done, killed_after):
     assert [name for _, name in steps.computed] == names[killed_after:]
     # every text that a step left is the same: nothing rests on what a process has kept
     assert all(steps.texts[second, name] == engine.texts[id, name] for name in names)
+
+
+@pytest.mark.slow
+def test_a_report_that_cannot_be_written_costs_no_result(done, monkeypatch):
+    client, _, campaign, id, engine, store, folder = done
+
+    def broken(*_args, **_further):
+        raise RuntimeError("secret detail")
+
+    monkeypatch.setattr("rcsa_ident.report.html.report_html", broken)
+    second = client.identify_campaign(campaign, seed=3, apply=False).id
+    steps = Steps()
+    steps.texts = {(second, name): engine.texts[id, name] for job, name in engine.computed if job == id}
+    carried(store, folder, steps)
+    assert client.job(second).state == "done"
+    assert client.job(second).problem.detail == NO_REPORT
+    assert client.result(second) == client.result(id)
+    refused(404, client.report, second)
 
 
 @pytest.mark.slow

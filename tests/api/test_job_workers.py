@@ -188,11 +188,22 @@ def test_a_job_that_goes_on_says_nothing_of_starting_over(store, machine):
     assert "note" not in [event.kind for event in store.jobs.events(id, 0, 100)]
 
 
-def test_a_step_that_cannot_be_read_back_at_once_is_a_fault(quiet, monkeypatch):
-    """Not an old text: the job would start over for ever."""
-    monkeypatch.setattr(desks, "_read", lambda text: None)
-    with quiet.desk() as desk, pytest.raises(desks.Faulty):
-        desk.remember("a", lambda: 1)
+def test_a_step_that_cannot_be_stored_loses_no_work(quiet, caplog):
+    """Its value is in hand: the job goes on. A process that dies has it start over, and not for ever."""
+    value = object()
+
+    def died_once_more():
+        quiet.store.jobs.begin(quiet.id, "w", now())
+        with quiet.desk() as desk:
+            assert desk.remember("a", lambda: value) is value
+        return quiet.store.jobs.find(quiet.id).attempts
+
+    assert died_once_more() == 2
+    assert "a step cannot be stored" in caplog.text
+    with quiet.desk() as desk, pytest.raises(desks.Outdated):
+        desk.remember("a", lambda: pytest.fail("computed beside what is remembered"))
+    quiet.steps.texts.clear()
+    assert died_once_more() == 3
 
 
 def test_refusals_are_remembered_as_such(quiet):

@@ -22,6 +22,7 @@ CALLS = [
     ("POST", "/machines", {"name": "x"}, "upload"),
     ("GET", "/machines", None, "read"),
     ("GET", "/machines/m", None, "read"),
+    ("GET", "/machines/m/contents", None, "read"),
     ("DELETE", "/machines/m", None, "upload"),
     ("PUT", "/machines/m/identification", {}, "upload"),
     ("GET", "/machines/m/identification", None, "read"),

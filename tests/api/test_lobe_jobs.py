@@ -29,11 +29,14 @@ def later(client, id, *toolings, **further):
 
 @pytest.mark.slow
 def test_as_a_job_they_are_the_same(shop, store, tmp_path):
+    """Its warnings included, whatever they are about."""
     client, id = shop
+    cut = {"feed_per_tooth_mm": 2.5}
     tested = [{"spindle_speed_rpm": 7777.0, "axial_depth_mm": 0.1, "verdict": "stable"}]
-    at_once = client.lobes(id, "T1", example(), speeds=SPEEDS, tested=tested)
+    at_once = client.lobes(id, "T1", example(), speeds=SPEEDS, tested=tested, cut=cut)
     assert at_once.toolings[0].tested.stable_stable == 1
-    job = later(client, id, "T1", example(), tested=tested)
+    assert any("feed per tooth is 2.5 mm" in words for words in at_once.toolings[0].warnings)
+    job = later(client, id, "T1", example(), tested=tested, cut=cut)
     waiting = client.lobe_job(job)
     assert (waiting.job.kind, waiting.job.state, waiting.answer) == ("lobes", "queued", None)
     # what it was asked of is what was there then

@@ -106,6 +106,38 @@ def test_the_answer_before_stays_and_is_marked(opened, shop: str):
     expect(answer).to_have_class(re.compile("before"))
 
 
+def test_a_recommended_cut_that_nobody_computes_any_more_is_not_said_to_come(opened, shop: str):
+    """Where it is refused, where a question follows that cannot be asked, and where one follows that waits for a hand."""
+    page = opened("#/listen")
+    held: list[Route] = []
+    page.route("**/v1/advice", lambda route: held.append(route))
+    page.goto(f"{page.url.split('#')[0]}#/change?machine={shop}&tooling=T1")
+    best, standing, immersion = page.locator(".best"), page.locator(".standing"), page.get_by_label("Radial immersion")
+
+    def coming(times: int) -> None:
+        until(lambda: page.wait_for_timeout(50) or len(held) == times)
+        expect(best).to_contain_text("The recommended cut is being computed")
+
+    def over() -> None:
+        expect(best).to_contain_text("No recommended cut has been computed")
+        expect(best).not_to_have_attribute("aria-busy", "true")
+
+    coming(1)
+    held[0].fulfill(status=422, content_type="application/problem+json", body=json.dumps({"status": 422, "detail": "too much"}))
+    expect(standing).to_contain_text("too much")
+    over()
+    immersion.fill("20")
+    coming(2)
+    immersion.fill("200")
+    over()
+    immersion.fill("30")
+    coming(3)
+    page.get_by_text("Material, spindle, method").click()
+    page.get_by_label("Method", exact=True).select_option("full-discretisation")
+    expect(standing).to_contain_text("“Compute” asks this one")
+    over()
+
+
 def test_a_place_in_the_queue_in_words(opened):
     page = opened()
     told = page.evaluate(

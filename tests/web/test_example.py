@@ -10,6 +10,7 @@ from playwright.sync_api import Page, expect
 from api.client import Client
 from tests.fixtures import by_hand
 from tests.fixtures.service import Served
+from tests.web.conftest import ROOT, drop
 
 #: Labels of the chart that lie over each other.
 _OVERPRINTS = """() => {
@@ -72,13 +73,37 @@ def test_from_an_empty_page_to_a_best_speed(opened, client: Client, served: Serv
     assert 15_000 < float(page.locator(".best").get_attribute("data-rpm") or 0.0) < 19_000
     assert clicks <= 4
 
-    # it goes as a whole
+    # what is dropped meanwhile is no part of it
     machine = next(m for m in client.machines() if m.example)
+    page.goto(f"{served.url}/#/machines/{machine.id}/recordings")
+    drop(page, "section.drop", [ROOT / "api" / "examples" / "small-campaign.zip"])
+    target = page.get_by_label("Machine", exact=True).last
+    expect(target).to_have_value("")
+    assert machine.name not in target.locator("option").all_inner_texts()
+    page.get_by_label("Its name").fill("Beside the example")
+    page.get_by_role("button", name="Take it in").click()
+    expect(page.locator(".facts")).to_contain_text("4 of 4", timeout=60_000)
+    expect(page.get_by_text("The virtual machine is cutting")).to_have_count(0)
+
+    # it goes as a whole, all of it named before
     page.goto(f"{served.url}/#/machines/{machine.id}")
     page.get_by_role("button", name="Forget").click()
+    words = page.get_by_role("dialog")
+    for what in (
+        f"Forget {machine.name}?",
+        "Campaign “Example: HPM sample machine”",
+        "48 recordings",
+        "Its identification",
+        "4 toolings: Example",
+    ):
+        expect(words).to_contain_text(what)
+    words.get_by_text("48 recordings").click()
+    expect(words.get_by_text(re.compile("_cut.h5, "))).to_be_visible()
     page.get_by_role("button", name="Forget it").click()
     expect(page.locator("h1")).not_to_have_text(machine.name)
     assert not any(m.example for m in client.machines())
+    (mine,) = (m for m in client.machines() if m.name == "Beside the example")
+    assert [(c.cuts, c.uploaded) for c in client.campaigns(mine.id)] == [(2, 2)]
     assert not any(t.name.startswith("Example") for t in client.toolings())
 
 

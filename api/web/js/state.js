@@ -22,7 +22,8 @@ export const knownMachines = () => machines ?? [];
 
 /** The machine that this person works at, or null where there is none. */
 export function machine() {
-  return knownMachines().find((m) => m.id === current) ?? knownMachines()[0] ?? null;
+  const known = knownMachines();
+  return known.find((m) => m.id === current) ?? known.find((m) => !m.example) ?? known[0] ?? null;
 }
 
 export function choose(id) {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from rcsa_ident.identification.posed.parameters import stiffening, unpack
 from rcsa_ident.identification.posed.posterior import RobotPosterior, RobotUnknowns
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.robot.model import RobotModel
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, RemarkCode
 from rcsa_ident.shown import Shown
 
 #: Share of each line left unexplained above which the answer is suspect, and of the cuts that may contradict the others.
@@ -27,7 +26,7 @@ FEWEST_POSTURES = 3
 TOLD = 0.5
 
 
-class RobotCode(StrEnum):
+class RobotCode(RemarkCode):
     """What may be said of an identification of a robot."""
 
     NOT_CONVERGED = "not-converged"

@@ -5,9 +5,9 @@ import { dropZone } from "../drop.js";
 import { confirmed, failed } from "../forms.js";
 import { filling, makeExample } from "../next_step.js";
 import { go, keep, to } from "../router.js";
-import { knownMachines } from "../state.js";
 import { namedFiles, queueFor } from "../uploads.js";
 import { text } from "../units.js";
+import { recordingsOf } from "./forgotten.js";
 import { identifyCard } from "./identify_card.js";
 import { learnCard, taught } from "./learn_card.js";
 import { recordingPanel } from "./recording.js";
@@ -30,7 +30,7 @@ export async function view({ id }, query, place) {
   const hammer = h("div");
   const detail = h("div", { class: "view" });
   const next = h("div", { class: "view" });
-  const example = knownMachines().some((m) => m.id === campaign.machine && m.example);
+  const { example } = campaign;
   add(
     place,
     head(
@@ -222,8 +222,9 @@ export async function view({ id }, query, place) {
   };
 
   async function remove() {
-    if (!(await confirmed(`Delete ${campaign.name}?`, "Its recordings go with it. What was identified from them stays.", "Delete it")))
-      return;
+    const names = [...new Set(namedFiles(campaign).filter((file) => file.uploaded).map((file) => file.name))];
+    const words = h("div", { class: "view" }, h("p", null, "Deleted with it:"), recordingsOf(names), h("p", null, "What was identified from them stays."));
+    if (!(await confirmed(`Delete ${campaign.name}?`, words, "Delete it"))) return;
     try {
       await send("DELETE", `campaigns/${id}`);
       go(`machines/${campaign.machine}/recordings`);

@@ -7,6 +7,7 @@ import { go, holdsEdits, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { quantityInput, u } from "../units.js";
 import { queueFor } from "../uploads.js";
+import { targetMachine } from "./target_machine.js";
 
 const SENSOR = ["Channel", "Measures", "Axis", "Sensitivity"];
 
@@ -42,11 +43,6 @@ export async function view(_args, _query, place) {
   const [, toolings] = await Promise.all([allMachines(), all("toolings")]);
   const here = machine();
   add(place, head("Describe the cuts", "For recordings without a campaign.toml."));
-  if (!here)
-    return void add(
-      place,
-      empty("No machine yet", "Make one first; the cuts belong to it.", link(to(""), "To the machines", "button primary")),
-    );
   if (!toolings.length)
     return void add(
       place,
@@ -59,7 +55,8 @@ export async function view(_args, _query, place) {
 
   const files = kept;
   const name = h("input", { autocomplete: "off", maxlength: 200 });
-  name.value = `${here.name}, ${new Date().toISOString().slice(0, 10)}`;
+  name.value = `${here && !here.example ? here.name : "Cuts"}, ${new Date().toISOString().slice(0, 10)}`;
+  const target = targetMachine("Machine 1");
   const rate = quantity("Sampling rate", "hertz", null, { name: "campaign.sampling_rate_hz", hint: "For files that carry none" });
   const material = h("input", { autocomplete: "off" });
   material.value = "EN AW-6082";
@@ -101,7 +98,13 @@ export async function view(_args, _query, place) {
   const form = h(
     "form",
     { class: "view", novalidate: true },
-    card("Campaign", null, h("div", { class: "fields" }, field("Name", name, { name: "campaign.name", double: true }), rate)),
+    card(
+      "Campaign",
+      null,
+      h("div", { class: "fields" }, field("Name", name, { name: "campaign.name", double: true }), rate),
+      h("div", { class: "fields broad" }, target.fields),
+      target.remark,
+    ),
     card(
       "Sensors",
       null,
@@ -211,8 +214,10 @@ export async function view(_args, _query, place) {
         })),
       };
       try {
-        const campaign = await post(`machines/${here.id}/campaigns`, made, { headers: once() });
-        choose(here.id);
+        const id = await target.id();
+        await allMachines(true);
+        const campaign = await post(`machines/${id}/campaigns`, made, { headers: once() });
+        choose(id);
         queueFor(campaign.id).add(campaign, [...taken.values()]);
         kept = [];
         holdsEdits(() => false);

@@ -3,11 +3,12 @@ import { once, part, post, Problem, send } from "../api.js";
 import { card, fill, h, note, waiting } from "../dom.js";
 import { busy, field, select, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
-import { allMachines, choose, knownMachines, machine } from "../state.js";
+import { allMachines, choose } from "../state.js";
 import { queueFor } from "../uploads.js";
 import { unzipped } from "../zip.js";
 import { keepFiles } from "./campaign_form.js";
 import { differing } from "./changes.js";
+import { targetMachine } from "./target_machine.js";
 
 const RECORDING = /\.(h5|hdf5|tdms|uff|unv|wav|rf64|bwf|w64|aiff?|caf|flac|ogg|opus|mp3|mat|parquet|csv)$/i;
 const TOML = { "Content-Type": "application/toml" };
@@ -112,13 +113,7 @@ function choiceOf(tooling) {
 function offer(place, found) {
   const { told, toolings } = found;
   const title = told.name;
-  const here = machine();
-  const which = select([...knownMachines().map((m) => [m.id, m.name]), ["", "A new machine"]], here?.id ?? "");
-  const called = h("input", { autocomplete: "off", maxlength: 64 });
-  called.value = asName(title);
-  const naming = field("Its name", called, { name: "name" });
-  naming.hidden = which.value !== "";
-  which.addEventListener("change", () => (naming.hidden = which.value !== ""));
+  const target = targetMachine(asName(title));
   const apart = toolings.filter((t) => t.differences.length).map(choiceOf);
   const absent = told.recordings.filter((name) => !found.recordings.some((file) => file.name.normalize("NFC") === name));
   const button = h("button", { class: "primary", disabled: told.missing.length > 0 }, "Take it in");
@@ -134,12 +129,8 @@ function offer(place, found) {
       fact(told.keys?.frfs ? "Recordings and FRFs" : "Recordings", `${found.recordings.length}${absent.length ? `; the campaign names ${absent.length} more` : ""}`),
       found.others.length ? fact("Left aside", `${found.others.length} other files`) : null,
     ),
-    h(
-      "div",
-      { class: "fields broad" },
-      field("Machine", which),
-      naming,
-    ),
+    h("div", { class: "fields broad" }, target.fields),
+    target.remark,
     apart.map((t) =>
       h(
         "section",
@@ -161,7 +152,7 @@ function offer(place, found) {
       const key = once();
       try {
         fill(said, waiting("writing toolings and campaign …"));
-        const machineId = which.value || (await made(called.value.trim()));
+        const machineId = await target.id();
         const chosen = (what) => apart.filter((t) => t.choice.value === what);
         const why = new URLSearchParams({ why: `with the campaign ${title || told.campaign}`.slice(0, 200) });
         for (const tooling of [...toolings.filter((t) => t.etag === null), ...chosen("replace")]) {
@@ -200,8 +191,4 @@ function named(error, what) {
   if (!(error instanceof Problem)) return error;
   const errors = error.errors.map((e) => ({ ...e, field: `${what}: ${e.field}` }));
   return new Problem(error.status, { detail: `${what}: ${error.message}`, errors });
-}
-
-async function made(name) {
-  return (await post("machines", { name, description: "" }, { headers: once() })).id;
 }

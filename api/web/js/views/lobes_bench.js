@@ -27,6 +27,11 @@ export function lobesBench({ form, toolings, query, keep, wanted = "" }) {
   let timer = null;
   /** Whether what is shown answers what is asked. */
   const mark = (current) => found.classList.toggle("before", !current && found.childElementCount > 0);
+  /** Nothing computes any more: no recommended cut is said to come. */
+  const ended = () => {
+    running?.abort();
+    for (const best of found.querySelectorAll(".best[aria-busy]")) notComputed(best);
+  };
 
   /** Compute; whoever is still telling what is wanted is not told what is missing. */
   function begin() {
@@ -47,6 +52,7 @@ export function lobesBench({ form, toolings, query, keep, wanted = "" }) {
     mark(false);
     const problem = form.problem();
     if (problem) {
+      ended();
       if (found.childElementCount) told.say(BEFORE);
       return void showProblem(form.element, problem, { focus: false });
     }
@@ -68,6 +74,7 @@ export function lobesBench({ form, toolings, query, keep, wanted = "" }) {
     } catch (error) {
       clearTimeout(late);
       if (error.name === "AbortError" || signal.aborted) return;
+      ended();
       mark(false);
       told.refused(error instanceof Problem ? error.message : "Something went wrong on this page.");
       if (!(error instanceof Problem)) console.error(error);
@@ -76,9 +83,8 @@ export function lobesBench({ form, toolings, query, keep, wanted = "" }) {
   }
 
   function stop() {
-    running?.abort();
+    ended();
     told.say("Stopped. “Compute” asks again.");
-    for (const best of found.querySelectorAll(".best[aria-busy]")) notComputed(best);
   }
 
   function ontested(next) {
@@ -91,7 +97,7 @@ export function lobesBench({ form, toolings, query, keep, wanted = "" }) {
     if (form.slow()) {
       look.keep();
       // what is shown answers something else, and its job works for nobody
-      running?.abort();
+      ended();
       told.clear();
       mark(false);
       return void (found.childElementCount && told.say(`${BEFORE} “Compute” asks this one.`));

@@ -9,6 +9,7 @@ import { go, to } from "../router.js";
 import { allMachines } from "../state.js";
 import { plain } from "../units.js";
 import { trail } from "./changes.js";
+import { contentsOf } from "./forgotten.js";
 import { coupling, modesCards, notes } from "./modes.js";
 
 const JSON_TYPE = "application/json";
@@ -176,16 +177,19 @@ function upload(machine, fault) {
 }
 
 async function forget(machine, fault) {
-  if (
-    !(await confirmed(
-      `Forget ${machine.name}?`,
-      `Its identification and its campaigns go with it${machine.example ? ", and the toolings of the example" : ""}. This cannot be undone.`,
-      "Forget it",
-    ))
-  )
-    return;
   try {
-    await send("DELETE", machine.example ? "examples/campaign" : `machines/${machine.id}`);
+    for (;;) {
+      const there = await get(`machines/${machine.id}/contents`);
+      if (!(await confirmed(`Forget ${machine.name}?`, contentsOf(there), "Forget it"))) return;
+      const path = machine.example ? "examples/campaign?own=true" : `machines/${machine.id}`;
+      try {
+        await send("DELETE", path, { headers: { "If-Match": `"${there.etag}"` } });
+        break;
+      } catch (error) {
+        // something has come since then: it is named, too, before it goes
+        if (error.status !== 412) throw error;
+      }
+    }
     await allMachines(true);
     go("");
   } catch (error) {
