@@ -116,10 +116,10 @@ def diagnose(
     if np.mean(bad) > MOST_BAD_CUTS:
         words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}"
         doubt(IdentificationCode.CONTRADICTING_CUTS, words)
-    reasons += further
     # a cause before what it leads to
     if not data.of_flange:
         doubt(IdentificationCode.HOUSING_ALONE, HOUSING_ALONE)
+    reasons += further
     for axis, band in zip(data.axes, bands, strict=True):
         if band > LARGEST_BAND:
             doubt(
