@@ -158,7 +158,7 @@ def test_of_two_toolings_all_starts_are_tried_and_the_likeliest_of_each_axis_on_
     """One axis that has come to an answer twice is no reason to stop: what it came to may be a side minimum, and so may the other's."""
     first, second, _ = shop.toolings
     quick = EvidenceSelection(search=SearchSettings(modes=3, population=2, generations=1, steps=1), candidates=1)
-    data, phases, ends = shop.prepare(cuts_of(shop, (first, second))[::4]), [], []
+    data, phases, ends = shop.prepare(cuts_of(shop, (first, second))[::2]), [], []
 
     def noting(function, tasks):
         answers = [function(task) for task in tasks]
@@ -176,6 +176,9 @@ def test_of_two_toolings_all_starts_are_tried_and_the_likeliest_of_each_axis_on_
         assert own.evidences == sorted(own.evidences)
         assert len(answer.candidates) == ATTEMPTS + 1
 
+    # a cut or two are not worth more starts
+    assert data.side_minima
+    assert not data.of_cuts(np.arange(0, len(data.cut_ids), 3)).side_minima
     # where none has come to the same answer twice it is told how far the likeliest differ, if they do
     whole, searched = shop.prepare(cuts_of(shop)[::4]), [answer for *_, answer in ends]
     for spread, codes in ((100.0, [IdentificationCode.NO_AGREEMENT]), (30.0, [])):
