@@ -13,6 +13,7 @@ from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.rough_toolings import RoughLines, placed
+from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING
 from rcsa_ident.signals.motion import FLANGE_ALONE, ONE_PLACE, searched, usual_shares
 from rcsa_ident.tool_holder.drawings import RoughToolings
 from rcsa_ident.tool_holder.rough import RoughToolHolder
@@ -369,6 +370,12 @@ class IdentificationData:
     def of_flange(self) -> bool:
         """Whether the flange's motion was measured, along each axis."""
         return all(axis.of_flange for axis in self.axes)
+
+    @property
+    def side_minima(self) -> bool:
+        """Whether further starts pay: no sensor sees the flange, of fewer than three toolings, each of which has cut often enough."""
+        cuts = np.bincount(self.cut_tooling[: self.cuts], minlength=len(self.toolings))
+        return not self.of_flange and len(self.toolings) < FEWEST_OF_HOUSING and bool(np.all(cuts >= FEWEST_CUTS))
 
     @property
     def sweeps(self) -> bool:

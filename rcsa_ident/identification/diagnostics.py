@@ -116,10 +116,10 @@ def diagnose(
     if np.mean(bad) > MOST_BAD_CUTS:
         words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}"
         doubt(IdentificationCode.CONTRADICTING_CUTS, words)
-    reasons += further
     # a cause before what it leads to
     if not data.of_flange:
         doubt(IdentificationCode.HOUSING_ALONE, HOUSING_ALONE)
+    reasons += further
     for axis, band in zip(data.axes, bands, strict=True):
         if band > LARGEST_BAND:
             doubt(
@@ -146,7 +146,7 @@ def diagnose(
 
 
 def two_solutions(data: IdentificationData, searched: Sequence[AxisSearch]) -> list[Remark]:
-    """Return for which axes two answers of equal evidence differ, and by how much.
+    """Return for which axes two answers of equal evidence differ, and by how much; or the two likeliest of searches that do not agree.
 
     Parameters
     ----------
@@ -156,13 +156,16 @@ def two_solutions(data: IdentificationData, searched: Sequence[AxisSearch]) -> l
     """
     found = []
     for axis, search in zip(data.axes, searched, strict=True):
-        if len(search.candidates) > 1 and search.evidences[1] - search.evidences[0] < EVIDENCE_TIE:
+        apart = data.side_minima and not search.confirmed
+        if len(search.candidates) > 1 and (apart or search.evidences[1] - search.evidences[0] < EVIDENCE_TIE):
             difference, band = _difference(axis, *search.candidates[:2])
-            if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
-                words = (
-                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in the machine's "
-                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains"
-                )
+            told = f"differ by {100 * difference:.1f} % in the machine's contribution to the tooltip FRF"
+            name = str(axis.axis).upper()
+            if apart and difference > LARGEST_DIFFERENCE:
+                words = f"{name}: searches do not agree: the two likeliest {told}; the chosen one may be wrong"
+                found.append(Remark(IdentificationCode.NO_AGREEMENT, words))
+            elif not apart and difference > max(LARGEST_DIFFERENCE, 3.0 * band):
+                words = f"{name}: two solutions of equal evidence {told}, more than its standard deviation of {100 * band:.1f} % explains"
                 found.append(Remark(IdentificationCode.TWO_SOLUTIONS, words))
     return found
 

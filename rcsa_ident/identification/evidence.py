@@ -166,7 +166,10 @@ class EvidenceSelection:
         return self._fit(data, freed, searched, map, _report_to(BOTH, trace, progress))
 
     def _search(self, data: IdentificationData, sequence: np.random.SeedSequence, map: Map, progress: Progress | None) -> list[AxisSearch]:
-        """Return the search of each axis, again from new starts until one has come to the same answer twice."""
+        """Return the search of each axis, again from new starts until one has come to the same answer twice.
+
+        Where the lines leave side minima that neither axis can tell from its own, all starts are tried and the likeliest counts.
+        """
         asked, data = _searched_cuts(data), data.as_drawn()
         summed = data.of_cuts(asked).summed() if asked.size < len(data.cut_ids) else data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
@@ -174,13 +177,23 @@ class EvidenceSelection:
         for _ in range(ATTEMPTS):
             tasks = [SearchAxis(self, part, own, progress) for part, own in zip(parts, sequence.spawn(len(parts)), strict=True)]
             found = finite(map(perform, tasks))
-            if len(found) == 2:
-                both = zip(parts, found, found[::-1], strict=True)
-                found = finite(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
+            if not data.side_minima:
+                found = self._from_each_other(parts, found, map, progress)
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
-            if self.start is not None or any(s.confirmed for s in searched):
+            if self.start is not None or (not data.side_minima and any(s.confirmed for s in searched)):
                 break
+        if data.side_minima:
+            searched = self._from_each_other(parts, searched, map, progress)
         return searched if asked.size == len(data.cut_ids) else [_of_all(search, asked, len(data.cut_ids)) for search in searched]
+
+    def _from_each_other(
+        self, parts: list[IdentificationData], found: list[AxisSearch], map: Map, progress: Progress | None
+    ) -> list[AxisSearch]:
+        """Return the search of each axis joined by one more from the other axis' answer, where there are two."""
+        if len(found) != 2:
+            return found
+        both = zip(parts, found, found[::-1], strict=True)
+        return finite(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
 
     def _fit(self, data: IdentificationData, freed: IdentificationData, searched: list[AxisSearch], map: Map, report: Report) -> Fit:
         """Return the fit of both axes: apart, or together where they feel each other.

@@ -40,6 +40,7 @@ class IdentificationCode(RemarkCode):
     UNEXPLAINED = "unexplained"
     CONTRADICTING_CUTS = "contradicting-cuts"
     TWO_SOLUTIONS = "two-solutions"
+    NO_AGREEMENT = "no-agreement"
     WIDE_POSTERIOR = "wide-posterior"
     ONE_TOOLING = "one-tooling"
     FEW_TOOLINGS = "few-toolings"

@@ -9,7 +9,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.data import couplable
 from rcsa_ident.identification.data import AxisData
-from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.diagnostics import two_solutions
+from rcsa_ident.identification.evidence import ATTEMPTS, EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines
@@ -19,6 +20,7 @@ from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.task import Phase
 from rcsa_ident.remarks import says
 from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, shares_of
 from rcsa_ident.virtual.rotor import frequency_response, rotor
@@ -152,12 +154,41 @@ def test_a_tooling_that_never_cut_follows_from_three_that_did(shop, data):
     assert max(errors(shop, louder)) < 0.25
 
 
-def test_two_toolings_are_few(shop):
+def test_of_two_toolings_all_starts_are_tried_and_the_likeliest_of_each_axis_on_the_other(shop):
+    """One axis that has come to an answer twice is no reason to stop: what it came to may be a side minimum, and so may the other's."""
     first, second, _ = shop.toolings
     quick = EvidenceSelection(search=SearchSettings(modes=3, population=2, generations=1, steps=1), candidates=1)
-    found = quick.run(shop.prepare(cuts_of(shop, (first, second))), 1)
+    data, phases, ends = shop.prepare(cuts_of(shop, (first, second))[::2]), [], []
+
+    def noting(function, tasks):
+        answers = [function(task) for task in tasks]
+        phases.append(tasks[0].phase)
+        if phases[-1] is Phase.OTHER_AXIS:
+            ends.extend((task.own, task.other, answer) for task, answer in zip(tasks, answers, strict=True))
+        return answers
+
+    found = quick.run(data, 1, noting)
     assert found.status is Status.SUSPECT
     assert says(found.reasons, IdentificationCode.FEW_TOOLINGS)
+    assert phases[: ATTEMPTS + 1] == [Phase.SEARCH] * ATTEMPTS + [Phase.OTHER_AXIS]
+    for own, other, answer in ends:
+        assert len(own.candidates) == len(other.candidates) == ATTEMPTS
+        assert own.evidences == sorted(own.evidences)
+        assert len(answer.candidates) == ATTEMPTS + 1
+
+    # a cut or two are not worth more starts
+    assert data.side_minima
+    assert not data.of_cuts(np.arange(0, len(data.cut_ids), 3)).side_minima
+    # where none has come to the same answer twice it is told how far the likeliest differ, if they do
+    whole, searched = shop.prepare(cuts_of(shop)[::4]), [answer for *_, answer in ends]
+    for spread, codes in ((100.0, [IdentificationCode.NO_AGREEMENT]), (30.0, [])):
+        x, y = (replace(each, candidates=[each.candidates[0]] * 2, evidences=[0.0, spread]) for each in searched)
+        other = replace(x, candidates=[x.candidates[0], searched[0].candidates[-1]])
+        remarks = two_solutions(data, [other, y])
+        assert [remark.code for remark in remarks] == codes
+        assert all(remark.startswith("X: searches do not agree: the two likeliest differ by ") for remark in remarks)
+        # three toolings say what the flange does, as far as they can
+        assert two_solutions(whole, [other, y]) == []
 
 
 def beside(shop, cuts, delays, rng):

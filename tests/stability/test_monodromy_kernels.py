@@ -208,7 +208,8 @@ def test_length_and_a_start_that_is_known():
     layout = cut._lay_out(15000.0 * RPM, 1e-3, 2e-4)
     value, _, used, vector, _ = kernels.multiplier(cut.arrays, layout, cut.table, False, 1e-12, False, np.zeros(0))
     again, _, fewer, _, _ = kernels.multiplier(cut.arrays, layout, cut.table, False, 1e-12, False, 1e3 * vector.real)
-    assert again == pytest.approx(value, rel=1e-10)
+    # of a conjugate pair either member may be the one that is found
+    assert (again.real, abs(again.imag)) == pytest.approx((value.real, abs(value.imag)), rel=1e-10)
     assert fewer <= used
 
 
