@@ -23,11 +23,21 @@ from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
+from rcsa_ident.plausibility import AXIAL_DEPTH, SPINDLE_SPEED
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.label_noise import LabelNoise
-from rcsa_ident.stability.lobes import DEEPER, DRAWS, asked_directions, both_directions, directions_for, in_proportion, stability_lobes
+from rcsa_ident.stability.lobes import (
+    DEEPER,
+    DRAWS,
+    asked_directions,
+    asked_speeds,
+    both_directions,
+    directions_for,
+    in_proportion,
+    stability_lobes,
+)
 from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
@@ -100,6 +110,8 @@ def tooltip(
     relative : bool
         Relative to the workpiece, as limits are computed from; by default the tool's own.
     """
+    if speed is not None:
+        SPINDLE_SPEED.checked("speed", speed)
     here = machine.at(speed)
     tip = (here.relative_tip if relative else here.tip)(tooling, omega, spread, stiffness_spread, here.translations)
     if isinstance(tip, TipModes):
@@ -144,6 +156,12 @@ class ToolChange:
     draws: int = DRAWS
     stiffness_spread: float = STIFFNESS_SPREAD
     recommend: bool = True
+
+    def __post_init__(self) -> None:
+        asked_speeds(self.speeds)
+        AXIAL_DEPTH.checked("max_depth", self.max_depth)
+        if not 0.0 <= self.stiffness_spread <= 0.5:
+            raise InputError("stiffness_spread", self.stiffness_spread, "a share from 0 to 0.5")
 
     @property
     def process(self) -> MillingProcess:
@@ -262,9 +280,14 @@ def advise(
         Cuts that were tried: how many do the limits tell right?
     """
     process = change.process
+    if depth is not None:
+        AXIAL_DEPTH.checked("depth", depth)
+    for i, (speed, at) in enumerate(planned):
+        SPINDLE_SPEED.checked(f"planned[{i}] spindle speed", speed)
+        AXIAL_DEPTH.checked(f"planned[{i}] axial depth", at)
     if depth is not None and 0.0 <= reserve < 1.0:
         # twice as deep as tells whether this depth may be cut: straight lines to the limits beside it show where its windows end
-        change = replace(change, max_depth=max(change.max_depth, 2.0 * depth / (1.0 - reserve)))
+        change = replace(change, max_depth=min(max(change.max_depth, 2.0 * depth / (1.0 - reserve)), AXIAL_DEPTH.most))
     wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
     low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
 
@@ -283,7 +306,7 @@ def advise(
         () if depth is None else tuple(speed_windows(usable, depth)),
         tuple(planned_cut(wide, process, drive, speed, at, tolerance, probability) for speed, at in planned),
         None if tested is None else classify_tested_cuts(change, tested),
-        tuple(dict.fromkeys([*change.remarks(lobes), *found.remarks])),
+        tuple(dict.fromkeys([*change.remarks(lobes), *drive.remarks, *found.remarks])),
         found.pockets,
         found.by,
         _band_of(change, found.points[0].spindle_speed, tolerance) if found.points and lobes.drawn is not None else None,
