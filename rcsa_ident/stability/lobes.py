@@ -85,6 +85,21 @@ def stability_lobes(
     13650 rev/min: stability limit 2.48 mm, recommended 1.23 mm
     9100 rev/min: stability limit 1.66 mm, recommended 0.88 mm
     """
+    unusual = unusual_speeds(process, asked_speeds(speeds)) + list(tip.remarks if isinstance(tip, TipModes) else ())
+    found = limits_of(tip, process, speeds, max_depth, method, draws, seed)
+    return replace(found, warnings=(*found.warnings, *unusual))
+
+
+def limits_of(
+    tip: Receptance | TipModes,
+    process: MillingProcess,
+    speeds: FloatArray,
+    max_depth: float,
+    method: StabilityMethod = _ZERO_ORDER,
+    draws: int = DRAWS,
+    seed: int = 1,
+) -> StabilityLobes:
+    """Return what `stability_lobes` does, without a word on what is unusual about its speeds and modes: whoever pads speeds says it."""
     speeds = asked_speeds(speeds)
     max_depth = SEARCHED_DEPTH.checked("max_depth", max_depth)
     _affordable(method, tip, process, speeds, max_depth)
@@ -95,8 +110,7 @@ def stability_lobes(
     ends = () if within == max_depth else (told,)
     found = _limits(tip, process, speeds, within, method, draws, seed)
     # the smallest limit is the depth beside which a corner radius is seen
-    said = (*ends, *process.cutter.cylinder_remarks(float(found.nominal.min())), *_unusual(tip, process, speeds))
-    return replace(found, warnings=(*found.warnings, *said))
+    return replace(found, warnings=(*found.warnings, *ends, *process.cutter.cylinder_remarks(float(found.nominal.min()))))
 
 
 def asked_speeds(speeds: FloatArray) -> FloatArray:
@@ -122,13 +136,12 @@ def _affordable(method: StabilityMethod, tip: Receptance | TipModes, process: Mi
         raise InputError("speeds", found, allowed)
 
 
-def _unusual(tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray) -> list[Remark]:
-    """What is unusual about speeds and modes, as a wrong unit would make it."""
+def unusual_speeds(process: MillingProcess, speeds: FloatArray) -> list[Remark]:
+    """Return what is unusual about spindle speeds [rad/s], as a wrong unit would make it."""
     ends = dict.fromkeys((float(speeds.min()), float(speeds.max())))
     found = remarks_of(("spindle speed", SPINDLE_SPEED, end) for end in ends)
     slowest = min(ends) * process.cutter.outline.largest_radius
-    found += remarks_of([("cutting speed of the lowest spindle speed", CUTTING_SPEED, slowest)])
-    return [*found, *(tip.remarks if isinstance(tip, TipModes) else ())]
+    return [*found, *remarks_of([("cutting speed of the lowest spindle speed", CUTTING_SPEED, slowest)])]
 
 
 def _limits(

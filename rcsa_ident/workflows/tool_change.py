@@ -23,7 +23,7 @@ from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
-from rcsa_ident.plausibility import AXIAL_DEPTH, SPINDLE_SPEED
+from rcsa_ident.plausibility import AXIAL_DEPTH, SEARCHED_DEPTH, SPINDLE_SPEED
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
@@ -36,7 +36,8 @@ from rcsa_ident.stability.lobes import (
     both_directions,
     directions_for,
     in_proportion,
-    stability_lobes,
+    limits_of,
+    unusual_speeds,
 )
 from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
@@ -159,7 +160,7 @@ class ToolChange:
 
     def __post_init__(self) -> None:
         asked_speeds(self.speeds)
-        AXIAL_DEPTH.checked("max_depth", self.max_depth)
+        SEARCHED_DEPTH.checked("max_depth", self.max_depth)
         if not 0.0 <= self.stiffness_spread <= 0.5:
             raise InputError("stiffness_spread", self.stiffness_spread, "a share from 0 to 0.5")
 
@@ -214,7 +215,7 @@ class ToolChange:
             return self.machine.limits(process, speeds, depth, draws)
         for places, tip in self.tips(speeds, self.omega, draws > 0):
             order.append(places)
-            parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
+            parts.append(limits_of(tip, process, speeds[places], depth, self.method, draws))
         return StabilityLobes.joined(parts, order)
 
     def fitting_limits(self, speeds: FloatArray) -> StabilityLobes:
@@ -240,6 +241,7 @@ class ToolChange:
             *self._beyond(lobes),
             *([outside] if outside else []),
             *_outside(self.machine, self.speeds),
+            *unusual_speeds(self.process, self.speeds),
         ]
         return tuple(dict.fromkeys(said))
 
@@ -280,6 +282,7 @@ def advise(
         Cuts that were tried: how many do the limits tell right?
     """
     process = change.process
+    AXIAL_DEPTH.checked("max_depth", change.max_depth)
     if depth is not None:
         AXIAL_DEPTH.checked("depth", depth)
     for i, (speed, at) in enumerate(planned):
