@@ -158,7 +158,8 @@ DIAMETER = _length((0.5, 250.0), (0.05, 1000.0))
 HELIX = Range("deg", math.radians(1.0), (0.0, 65.0), (0.0, 81.0))
 STICKOUT = _length((2.0, 500.0), (0.5, 5000.0))
 SEGMENT_DIAMETER = _length((0.1, 400.0), (0.001, 1000.0))
-SEGMENT_LENGTH = _length((0.05, 1000.0), (0.001, 5000.0))
+#: What a library's rounded figures leave may be a micrometre.
+SEGMENT_LENGTH = _length((1e-9, 1000.0), (1e-9, 5000.0))
 RUNOUT = Range("µm", 1e-6, (-100.0, 100.0), (-1000.0, 1000.0), (("was it given in µm ({})?", 1e-6), ("was it given in mm ({})?", 1e-3)))
 MODULUS = Range("GPa", 1e9, (40.0, 750.0), (0.5, 2000.0), (("was it given in MPa ({})?", 1e-3), ("was it given in TPa ({})?", 1e3)))
 DENSITY = Range("kg/m^3", 1.0, (1200.0, 20_000.0), (100.0, 30_000.0), (("was it given in g/cm^3 ({})?", 1e3),))
@@ -205,8 +206,10 @@ JOINT_STIFFNESS = Range(
 FEED_ANGLE = Range(
     "deg", math.radians(1.0), (-360.0, 360.0), (-720.0, 720.0), (("were degrees given as radians ({})?", math.radians(1.0)),)
 )
+#: Of the rows of a map of engagement.
+HEIGHT = _length((0.0, 60.0), (0.0, 500.0))
 #: Of a block's side beside the cutter's path, and of a stepover.
-SIDE, STEPOVER = _length((-500.0, 500.0), (-2000.0, 2000.0)), _length((0.005, 500.0), (1e-4, 2000.0))
+SIDE, STEPOVER = _length((-500.0, 500.0), (-2000.0, 2000.0)), _length((0.005, 500.0), (1e-9, 2000.0))
 SPINDLE_SPEED = Range(
     "rev/min",
     from_rpm(1.0),
@@ -249,5 +252,5 @@ TIP_STIFFNESS = Range(
     ),
 )
 TIP_DAMPING = Range("", 1.0, (0.001, 0.3), (1e-6, 1.0), (("was it given in percent ({})?", 1e-2),))
-RATE = Range("Hz", 1.0, (200.0, 5e6), (10.0, 1e8), (("was it given in kHz ({})?", 1e3),))
+RATE = Range("Hz", 1.0, (200.0, 5e6), (0.1, 1e8), (("was it given in kHz ({})?", 1e3),))
 SENSOR_MASS = Range("g", 1e-3, (0.0, 100.0), (0.0, 1000.0), (("was it given in g ({})?", 1e-3),))

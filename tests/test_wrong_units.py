@@ -78,7 +78,6 @@ def heard(rate=25600.0, speed=628.3):
 
 
 SHARE, DELAY = table.Range("", 1.0, (0.0, 0.5), (0.0, 0.5)), table.Range("s", 1.0, (-1.0, 1.0), (-1.0, 1.0))
-HEIGHT = table.Range("mm", 1e-3, (0.0, 500.0), (0.0, 500.0))
 #: What a drawing of 100 mm and a bore of 60 mm leave, of a shank of 12 mm.
 INSERTION = table.Range("mm", 1e-3, (4.8, 40.0), (0.48, 40.0))
 #: Asked for, and refused where it is impossible; nobody remarks on what is only unusual.
@@ -101,9 +100,9 @@ FIELDS = {
     "CutSpec.coefficients": (7e8, table.TANGENTIAL, lambda v: spec(coefficients={"tangential": v, "radial_ratio": 0.3}), "tangential"),
     "CuttingCoefficients.radial_ratio": (0.3, table.RADIAL_RATIO, lambda v: ri.CuttingCoefficients(7e8, v).remarks, "radial"),
     "CuttingCoefficients.tangential_edge": (12e3, table.EDGE, lambda v: ri.CuttingCoefficients(7e8, 0.3, 0.0, v).remarks, "edge"),
-    "Stepover.width": (0.006, table.STEPOVER, lambda v: Stepover(v, "up"), "width"),
+    "Stepover.width": (0.006, table.STEPOVER, lambda v: process(engagement=Stepover(v, "up")).remarks, ""),
     "Block.y_to": (0.006, table.SIDE, lambda v: Block(-0.006, v), "y_"),
-    "EngagementMap.z": (0.01, HEIGHT, lambda v: EngagementMap([0.0, v], [0.0, 0.0], [1.0, 1.0]), "heights"),
+    "EngagementMap.z": (0.01, table.HEIGHT, lambda v: EngagementMap([0.0, v], [0.0, 0.0], [1.0, 1.0]), "heights"),
     "ProcessDamping.wear_land": (50e-6, table.WEAR_LAND, lambda v: process(damping=ri.ProcessDamping(1e14, v)).remarks, "wear"),
     "ProcessDamping.indentation": (1e14, table.INDENTATION, lambda v: process(damping=ri.ProcessDamping(v, 50e-6)).remarks, "indentation"),
     "SpindleDrive.power": (15e3, table.POWER, lambda v: ri.SpindleDrive.flat(power=v).remarks, "power"),

@@ -10,7 +10,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.errors import InputError, non_negative, positive
-from rcsa_ident.plausibility import AXIAL_DEPTH, SIDE, STEPOVER
+from rcsa_ident.plausibility import HEIGHT, SIDE, STEPOVER
 from rcsa_ident.shown import Shown
 from rcsa_ident.units import to_rpm
 
@@ -206,8 +206,7 @@ class EngagementMap(Shown):
             )
         if not np.all(np.isfinite(self.z)) or np.any(np.diff(self.z) < 0.0) or self.z[0] < 0.0:
             raise InputError("engagement map heights", self.z.tolist(), "heights of 0 or more that never fall [m]")
-        if self.z[-1] > 0.0:
-            AXIAL_DEPTH.checked("engagement map heights", float(self.z[-1]))
+        HEIGHT.checked("engagement map heights", float(self.z[-1]))
         if not np.all((self.start >= 0.0) & (self.start <= self.end) & (self.end <= 2.0 * np.pi + 1e-9)):
             raise InputError(
                 "engagement map angles", "an arc outside 0 to 360 degrees or with its end before its start", "0 <= start <= end"

@@ -63,7 +63,7 @@ def test_what_is_impossible_is_refused(key, value, words):
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("contact.translational_stiffness", 3e9, "a loss factor of 0.21 at 1000 Hz, but usual is a loss factor of at most 0.15"),
+        ("contact.translational_damping", 1e6, "a loss factor of 0.21 at 1000 Hz, but usual is a loss factor of at most 0.15"),
         ("contact.rotational_damping", 450.0, "a loss factor of 3.1 at 1000 Hz"),
         ("holder.insertion_mm", 2.0, "2 mm of a tool that is 12 mm thick there, but usual is 0.4 to 15 times"),
         ("tool.segments[1].inner_diameter_mm", 8.0, "8 mm in an outer diameter of 12 mm"),
