@@ -251,6 +251,6 @@ TIP_STIFFNESS = Range(
         ("was it given in N/mm ({})?", 1e3),
     ),
 )
-TIP_DAMPING = Range("", 1.0, (0.001, 0.3), (1e-6, 1.0), (("was it given in percent ({})?", 1e-2),))
+TIP_DAMPING = Range("", 1.0, (0.001, 0.5), (1e-6, 1.0), (("was it given in percent ({})?", 1e-2),))
 RATE = Range("Hz", 1.0, (200.0, 5e6), (0.1, 1e8), (("was it given in kHz ({})?", 1e3),))
 SENSOR_MASS = Range("g", 1e-3, (0.0, 100.0), (0.0, 1000.0), (("was it given in g ({})?", 1e-3),))
