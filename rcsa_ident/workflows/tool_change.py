@@ -159,7 +159,8 @@ class ToolChange:
     recommend: bool = True
 
     def __post_init__(self) -> None:
-        asked_speeds(self.speeds)
+        if np.size(self.speeds):  # a path brings its own
+            asked_speeds(self.speeds)
         SEARCHED_DEPTH.checked("max_depth", self.max_depth)
         if not 0.0 <= self.stiffness_spread <= 0.5:
             raise InputError("stiffness_spread", self.stiffness_spread, "a share from 0 to 0.5")
