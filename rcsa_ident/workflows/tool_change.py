@@ -284,9 +284,8 @@ def advise(
         Cuts that were tried: how many do the limits tell right?
     """
     process = change.process
-    AXIAL_DEPTH.checked("max_depth", change.max_depth)
-    if depth is not None:
-        AXIAL_DEPTH.checked("depth", depth)
+    for name, deep in (("max_depth", change.max_depth), *([] if depth is None else [("depth", depth)])):
+        AXIAL_DEPTH.checked(name, deep)
     for i, (speed, at) in enumerate(planned):
         SPINDLE_SPEED.checked(f"planned[{i}] spindle speed", speed)
         AXIAL_DEPTH.checked(f"planned[{i}] axial depth", at)
