@@ -59,7 +59,7 @@ def constant(part: FloatArray, rate: float, hertz: float, orders: int = _ORDERS)
 def told(path: Path) -> tuple[Listening, FloatArray, float, Quantity, float]:
     """Return what a file says, its samples and rate, what they are, and the processor time that it took [s]."""
     opened = open_recording(path)
-    quantity, channels = opened.of()
+    quantity, channels, _ = opened.of()
     began = time.process_time()
     answer = listen_to(opened.rate, [each.samples for each in channels], quantity, TOLD.get(path.name))
     return answer, answer.record.samples, opened.rate, quantity, time.process_time() - began

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.coefficients import CuttingCoefficients, checked_coefficient
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
@@ -17,14 +17,14 @@ from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVari
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion, engagement_with
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPINDLE_SPEED, remarks_of
+from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, RUNOUT, SPINDLE_SPEED, remarks_of
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.tool_holder.catalogue import assumption, stated
 from rcsa_ident.tool_holder.drawings import Drawing
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
-from rcsa_ident.tool_holder.proportions import cutter_values, proportions
+from rcsa_ident.tool_holder.proportions import proportions
 from rcsa_ident.tool_holder.spread import UNSTATED, Spread
 from rcsa_ident.units import to_rpm
 
@@ -125,7 +125,7 @@ class BareCutter(Tooling):
         fields: dict[str, Any] = {"name": name, "cutter": cutter, "spread": UNSTATED, "tool_model": "", "holder_model": ""}
         for field_name, value in fields.items():
             object.__setattr__(self, field_name, value)
-        tuple(remarks_of(cutter_values(cutter)))  # an impossible one is refused
+        tuple(remarks_of(cutter.values))  # an impossible one is refused
 
     def __reduce__(self) -> tuple[type[BareCutter], tuple[str, Cutter]]:
         """Pickle without the assembly that it has not."""
@@ -141,7 +141,7 @@ class BareCutter(Tooling):
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What is unusual about the cutter."""
-        return tuple(remarks_of(cutter_values(self.cutter)))
+        return tuple(remarks_of(self.cutter.values))
 
     def __str__(self) -> str:
         return f"{self.name}: {self.cutter}"
@@ -203,6 +203,15 @@ class CutSpec(Shown):
     runout: tuple[float, ...] | None = None
     damping: ProcessDamping | None = None
     speed_variation: SpeedVariation | None = None
+
+    def __post_init__(self) -> None:
+        FEED_ANGLE.checked("feed_angle", self.feed_angle)
+        if self.feed_per_tooth is not None:
+            FEED_PER_TOOTH.checked("feed_per_tooth", self.feed_per_tooth)
+        for offset in self.runout or ():
+            RUNOUT.checked("runout", offset)
+        for name, value in self.coefficients.items():
+            checked_coefficient(name, value)
 
     def process(self, cutter: Cutter, workpiece: Workpiece | None = None) -> MillingProcess:
         """Return the milling process with a cutter, in a workpiece where the cut names no material.

@@ -81,6 +81,11 @@ class Range:
             PlausibilityCode.UNUSUAL, f"{_in_words(field)} is {self.told(value)}, but usual are {self._usual()}{self._slip(value)}"
         )
 
+    @property
+    def most(self) -> float:
+        """The largest value that is possible [SI]."""
+        return self.possible[1] * self.size
+
     def told(self, value: float) -> str:
         """Return a value [SI] in the unit of files."""
         return f"{self._given(value):.6g} {self.unit}".rstrip()
@@ -154,6 +159,9 @@ DIAMETER = _length((0.5, 250.0), (0.05, 1000.0))
 HELIX = Range("deg", math.radians(1.0), (0.0, 65.0), (0.0, 81.0))
 STICKOUT = _length((2.0, 500.0), (0.5, 5000.0))
 SEGMENT_DIAMETER = _length((0.1, 400.0), (0.001, 1000.0))
+#: What a library's rounded figures leave may be a micrometre.
+SEGMENT_LENGTH = _length((1e-9, 1000.0), (1e-9, 5000.0))
+RUNOUT = Range("µm", 1e-6, (-100.0, 100.0), (-1000.0, 1000.0), (("was it given in µm ({})?", 1e-6), ("was it given in mm ({})?", 1e-3)))
 MODULUS = Range("GPa", 1e9, (40.0, 750.0), (0.5, 2000.0), (("was it given in MPa ({})?", 1e-3), ("was it given in TPa ({})?", 1e3)))
 DENSITY = Range("kg/m^3", 1.0, (1200.0, 20_000.0), (100.0, 30_000.0), (("was it given in g/cm^3 ({})?", 1e3),))
 LOSS_FACTOR = Range("", 1.0, (0.0, 0.1), (0.0, 1.0), (("was it given in percent ({})?", 1e-2),))
@@ -169,6 +177,10 @@ CONTACT = {
     "translational_damping": Range("N s/m per m", 1.0, (0.0, 1e8), (0.0, 1e12)),
     "rotational_damping": Range("N m s/rad per m", 1.0, (0.0, 1e5), (0.0, 1e9)),
 }
+#: Loss factor of a contact at `CONTACT_FREQUENCY` [rad/s], damping times frequency over stiffness, as (usual, possible), of translation and
+#: rotation: joints of tools lose 0.01 to 0.1 of the energy, and none moves as in oil.
+CONTACT_FREQUENCY = 2.0 * math.pi * 1000.0
+CONTACT_LOSS = {"translational": ((0.0, 0.15), (0.0, 3.0)), "rotational": ((0.0, 2.0), (0.0, 30.0))}
 
 # -- the cut -----------------------------------------------------------------------------------------------------------------------
 
@@ -176,7 +188,7 @@ TANGENTIAL = Range(
     "MPa",
     1e6,
     (50.0, 10_000.0),
-    (5.0, 50_000.0),
+    (30.0, 50_000.0),
     (
         ("was it given in GPa ({})?", 1e3),
         ("was it given in Pa ({})?", 1e-6),
@@ -191,7 +203,55 @@ IMMERSION = Range("%", 1e-2, (1.5, 100.0), (0.0, 100.0), (("was {} meant?", 1e2)
 JOINT_STIFFNESS = Range(
     "N m/rad", 1.0, (1e4, 1e8), (1e2, 1e10), (("was it given in N m/° ({})?", 180.0 / math.pi), ("was it given in kN m/rad ({})?", 1e3))
 )
-SPINDLE_SPEED = Range("rev/min", from_rpm(1.0), (150.0, 80_000.0), (1.0, 500_000.0))
+#: Of the feed, from +X.
+FEED_ANGLE = Range(
+    "deg", math.radians(1.0), (-360.0, 360.0), (-720.0, 720.0), (("were degrees given as radians ({})?", math.radians(1.0)),)
+)
+#: Of the rows of a map of engagement.
+HEIGHT = _length((0.0, 60.0), (0.0, 500.0))
+#: Of a block's side beside the cutter's path, and of a stepover.
+SIDE, STEPOVER = _length((-500.0, 500.0), (-2000.0, 2000.0)), _length((0.005, 500.0), (1e-9, 2000.0))
+SPINDLE_SPEED = Range(
+    "rev/min",
+    from_rpm(1.0),
+    (150.0, 80_000.0),
+    (10.0, 500_000.0),
+    (("were rev/min given as rad/s ({})?", from_rpm(1.0)), ("was rad/s given in rev/s ({})?", 2.0 * math.pi)),
+)
+#: Of the widest point of an edge.
+CUTTING_SPEED = Range("m/min", 1.0 / 60.0, (0.5, 2500.0), (0.0, 1e6), (("were rev/min given as rad/s ({})?", from_rpm(1.0)),))
+WEAR_LAND = Range("µm", 1e-6, (1.0, 500.0), (0.01, 1000.0), (("was it given in µm ({})?", 1e-6), ("was it given in mm ({})?", 1e-3)))
+INDENTATION = Range("N/m^3", 1.0, (1e12, 1e16), (1e9, 1e17), (("was it given in N/mm^3 ({})?", 1e9),))
+POWER = Range("kW", 1e3, (0.05, 200.0), (0.001, 10_000.0), (("was it given in kW ({})?", 1e3), ("was it given in W ({})?", 1e-3)))
+TORQUE = Range("N m", 1.0, (0.01, 3000.0), (0.001, 1e6), (("was it given in N mm ({})?", 1e-3),))
 #: Least and largest change of the speed within a pass, as a share of its first.
 LEAST_SWEEP, LARGEST_SWEEP = 0.005, 2.0
 AXIAL_DEPTH = _length((0.01, 60.0), (1e-4, 500.0))
+#: Up to which limits are looked for: proportions of drawn machines and the windows of a depth look further than the deepest cut.
+SEARCHED_DEPTH = _length((0.01, 60.0), (1e-4, 5000.0))
+
+# -- a tip's modes and recordings --------------------------------------------------------------------------------------------------
+
+#: Of the tip's highest mode.
+TIP_FREQUENCY = Range(
+    "Hz",
+    2.0 * math.pi,
+    (100.0, 50_000.0),
+    (0.5, 1e6),
+    (("was it given in Hz where rad/s is asked for ({})?", 2.0 * math.pi), ("was it given in kHz ({})?", 1e3)),
+)
+#: Of the tip's softest mode: a micro-mill of 0.1 mm has about 1e4 N/m, a heavy tip 1e9.
+TIP_STIFFNESS = Range(
+    "N/m",
+    1.0,
+    (1e5, 2e9),
+    (1e3, 1e12),
+    (
+        ("were natural frequencies given in Hz where rad/s is asked for ({})?", 4.0 * math.pi**2),
+        ("was it given in N/µm ({})?", 1e6),
+        ("was it given in N/mm ({})?", 1e3),
+    ),
+)
+TIP_DAMPING = Range("", 1.0, (0.001, 0.5), (1e-6, 1.0), (("was it given in percent ({})?", 1e-2),))
+RATE = Range("Hz", 1.0, (200.0, 5e6), (0.1, 1e8), (("was it given in kHz ({})?", 1e3),))
+SENSOR_MASS = Range("g", 1e-3, (0.0, 100.0), (0.0, 1000.0), (("was it given in g ({})?", 1e-3),))

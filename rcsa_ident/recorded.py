@@ -71,10 +71,10 @@ def listen(
     if quantity is not None and quantity not in known:
         raise InputError("quantity", quantity, ", ".join(known))
     opened = open_recording(path, channels, rate)
-    measured, chosen = opened.of(None if quantity is None else Quantity(quantity), channels)
+    measured, chosen, assumed = opened.of(None if quantity is None else Quantity(quantity), channels)
     with threadpool_limits(1):
         answer = listen_to(opened.rate, [each.samples for each in chosen], measured, teeth, speed, between, path.name)
-    return replace(answer, reasons=(*answer.reasons, *opened.remarks))
+    return replace(answer, reasons=(*answer.reasons, *assumed))
 
 
 def tap(
@@ -130,7 +130,7 @@ def tap(
         raise InputError("axis", axis, "X or Y")
     opened = [open_recording(path, [name for name in (force, response) if name], rate) for path in recordings]
     with threadpool_limits(1):
-        return tap_recordings(opened, force, response, quantity, HitEstimator(estimator), sensor_mass, axis)[0]
+        return tap_recordings(opened, force, response, quantity, HitEstimator(estimator), sensor_mass, axis)
 
 
 def ring(

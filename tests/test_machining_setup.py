@@ -85,7 +85,7 @@ def test_a_campaign_remarks_on_its_toolings_its_workpiece_and_its_cuts(tmp_path)
     assert usual.remarks == ()
     thin = tooling_of(tomllib.loads(by_hand.TOOLING.replace("inner_diameter_mm = 12.0", "inner_diameter_mm = 20.0")), "", "T1")
     shallow = [replace(cut, conditions=replace(cut.conditions, axial_depth=4e-6)) for cut in usual.cuts]
-    soft = Workpiece("foam", CuttingCoefficients(2e7, 0.3))
+    soft = Workpiece("foam", CuttingCoefficients(4e7, 0.3))
     found = replace(usual, toolings={"T1": thin}, workpiece=soft, cuts=tuple(shallow)).remarks
     assert [remark.split(" is ")[0] for remark in found] == [
         "T1: holder.segments[0].inner_diameter_mm",
@@ -96,7 +96,7 @@ def test_a_campaign_remarks_on_its_toolings_its_workpiece_and_its_cuts(tmp_path)
 
 def test_an_identification_notes_what_is_unusual_about_its_campaign(tmp_path):
     usual = by_hand.campaign(tmp_path)
-    odd = replace(usual, workpiece=Workpiece("foam", CuttingCoefficients(2e7, 0.3)))
+    odd = replace(usual, workpiece=Workpiece("foam", CuttingCoefficients(4e7, 0.3)))
     known = by_hand.identification()
     assert of_campaign(known, usual).notes == known.notes
     assert of_campaign(known, odd).notes == (*known.notes, *odd.remarks)

@@ -83,7 +83,7 @@ def test_materials_of_the_library_are_usual():
 def test_a_process_remarks_on_coefficients_feed_and_immersion():
     usual = MillingProcess(Cutter(4, 0.012), CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.02, "up"), feed_per_tooth=1e-4)
     assert usual.remarks == ()
-    odd = MillingProcess(Cutter(4, 0.012), CuttingCoefficients(2e7, 1.8), Engagement.from_immersion(0.005, "up"), feed_per_tooth=5e-3)
+    odd = MillingProcess(Cutter(4, 0.012), CuttingCoefficients(4e7, 1.8), Engagement.from_immersion(0.005, "up"), feed_per_tooth=5e-3)
     assert [remark.split(" is ")[0] for remark in odd.remarks] == [
         "tangential coefficient",
         "radial ratio",

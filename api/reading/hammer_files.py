@@ -12,14 +12,16 @@ import numpy as np
 
 from api.reading.campaign_text import Upload, campaign_of_text
 from api.reading.examine import with_client_name
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.receptance import MeasuredCurve, assumed_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.hammer import read_hammer_test
 from rcsa_ident.machining_setup import HammerTest
+from rcsa_ident.remarks import Remark
+from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.units import to_hz
 from rcsa_ident.workflows.identify import hammer_lines
 
-_ID, _FREQUENCY, _REAL, _IMAGINARY = "id", "frequency_hz", "real", "imaginary"
+_ID, _FREQUENCY, _REAL, _IMAGINARY, _ASSUMED = "id", "frequency_hz", "real", "imaginary", "assumed"
 
 
 def look(upload: Upload, text: str) -> dict[str, Any]:
@@ -44,9 +46,11 @@ def look(upload: Upload, text: str) -> dict[str, Any]:
     except InputError as error:
         raise with_client_name(error, upload.path, upload.name) from None
     with h5py.File(upload.target, "w") as file:
-        for i, (test, (frequency, value)) in enumerate(zip(tests, curves, strict=True)):
+        for i, (test, curve) in enumerate(zip(tests, curves, strict=True)):
+            frequency, value = curve
             group = file.create_group(f"{i}")
             group.attrs[_ID] = test.id
+            group.attrs[_ASSUMED] = list(assumed_of([curve]))
             for name, values in ((_FREQUENCY, frequency), (_REAL, value.real), (_IMAGINARY, value.imag)):
                 group.create_dataset(name, data=values, chunks=values.shape, fletcher32=True, track_times=False)
     with upload.target.open("rb+") as written:
@@ -55,7 +59,13 @@ def look(upload: Upload, text: str) -> dict[str, Any]:
         {"id": each.id, "lines": each.omega.size, "from_hz": to_hz(float(each.omega[0])), "to_hz": to_hz(float(each.omega[-1]))}
         for each in lines
     ]
-    verdict = {"usable": True, "reasons": [], "notes": [], "spindle_speed_rpm": None, "signal_to_noise_db": {}}
+    verdict = {
+        "usable": True,
+        "reasons": [],
+        "notes": list(dict.fromkeys(remark for each in lines for remark in each.remarks)),
+        "spindle_speed_rpm": None,
+        "signal_to_noise_db": {},
+    }
     return {
         "sampling_rate_hz": None,
         "duration_s": None,
@@ -67,12 +77,13 @@ def look(upload: Upload, text: str) -> dict[str, Any]:
     }
 
 
-def read_stored(test: HammerTest) -> tuple[FloatArray, ComplexArray]:
+def read_stored(test: HammerTest) -> MeasuredCurve:
     """Return the frequencies [Hz] and the receptance [m/N] of a test whose file is a normalised one, shape (n,) both."""
     try:
         with h5py.File(test.file, "r", locking=False) as file:
             group = next(each for each in file.values() if each.attrs[_ID] == test.id)
             frequency, real, imaginary = (np.asarray(group[name], dtype=float) for name in (_FREQUENCY, _REAL, _IMAGINARY))
+            said = list(group.attrs.get(_ASSUMED, ()))  # files of an earlier release have none
     except (OSError, KeyError, StopIteration):
         raise InputError("frfs", f"{test.id}: an FRF that is missing or damaged", "an uploaded file of the test") from None
-    return frequency, real + 1j * imaginary
+    return MeasuredCurve(frequency, real + 1j * imaginary, (Remark(RecordCode.ASSUMED, str(each)) for each in said))

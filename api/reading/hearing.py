@@ -20,7 +20,7 @@ from rcsa_ident.io.told_tables import OpenRecording
 from rcsa_ident.report.ring_rows import ring_row
 from rcsa_ident.report.summaries import listening_row, tap_row
 from rcsa_ident.signals.listening import Listening
-from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.spectra import envelope, mean_spectrum, spectrogram
 from rcsa_ident.signals.tap import HitEstimator, TapFrf
 from rcsa_ident.units import from_rpm, to_hz
@@ -34,7 +34,6 @@ _POINTS, _LINES, _COLUMNS, _ROWS, _RANGE = 800, 1600, 200, 140, 60.0
 _ORDERS, _BEYOND = 60, 1.3
 #: Highest frequency that a tooling's elements are made for [Hz]; windows of a ring's spectrum [s], and what is shown of it [Hz].
 _HIGHEST_RING, _RING_SECONDS, _RING_BAND = 20e3, 0.25, (250.0, 25e3)
-_UNITS = {Quantity.ACCELERATION: "m/s²", Quantity.DISPLACEMENT: "m", Quantity.FORCE: "N", Quantity.SOUND: "of full scale"}
 
 
 def listen(path: Path, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -49,13 +48,13 @@ def listen(path: Path, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
     """
     opened = _opened(path, name, asked["channel"], asked["rate_hz"])
     try:
-        quantity, channels = opened.of(None if asked["quantity"] is None else Quantity(asked["quantity"]), asked["channel"])
+        quantity, channels, assumed = opened.of(None if asked["quantity"] is None else Quantity(asked["quantity"]), asked["channel"])
         speed = None if asked["speed_rpm"] is None else from_rpm(asked["speed_rpm"])
         between = None if asked["speeds_from"] is None else (from_rpm(asked["speeds_from"]), from_rpm(asked["speeds_to"]))
         answer = listen_to(opened.rate, [each.samples for each in channels], quantity, asked["teeth"], speed, between, name)
     except InputError as error:
         raise with_client_name(error, path, name) from None
-    row = {"recording": name} | listening_row(answer, [each.name for each in channels], opened.remarks)
+    row = {"recording": name} | listening_row(answer, [each.name for each in channels], assumed)
     return row | {"curves": _curves(answer) if asked["curves"] else None}
 
 
@@ -72,7 +71,7 @@ def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:
     wanted = [name for name in (asked["force"], asked["response"]) if name is not None]
     opened = [_opened(hit.path, hit.name, wanted, asked["rate_hz"]) for hit in hits]
     chosen = {name: asked[name] for name in ("force", "response", "quantity", "axis")}
-    found, remarks = tap_recordings(opened, **chosen, estimator=HitEstimator(asked["estimator"]), sensor_mass=1e-3 * asked["sensor_mass_g"])
+    found = tap_recordings(opened, **chosen, estimator=HitEstimator(asked["estimator"]), sensor_mass=1e-3 * asked["sensor_mass_g"])
     if asked["file"]:
         # the suffix says how, and a target has none
         made = hits[0].target.with_name(hits[0].target.name + asked["file"])
@@ -81,7 +80,7 @@ def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:
             made.replace(hits[0].target)
         finally:
             made.unlink(missing_ok=True)
-    return tap_row(found, [hit.name for hit in hits], remarks) | _receptance(found)
+    return tap_row(found, [hit.name for hit in hits]) | _receptance(found)
 
 
 def ring(tooling: ToolingSource, asked: Mapping[str, Any], *paths: Path) -> dict[str, Any]:
@@ -145,7 +144,7 @@ def _curves(answer: Listening) -> dict[str, Any]:
     starts = np.arange(0, level.shape[0], together)
     rows = np.clip(np.maximum.reduceat(level, starts, axis=0) - level.max(), -_RANGE, 0.0)
     return {
-        "unit": _UNITS.get(answer.record.quantity, ""),
+        "unit": SI_UNITS.get(answer.record.quantity, ""),
         "signal": {"step_s": width / rate, "low": _short(low), "high": _short(high)},
         "spectrum": {"frequency_hz": _short(frequency[shown][highest], 7), "amplitude": _short(amplitude[shown][highest])},
         "spectrogram": {

@@ -23,6 +23,7 @@ from api.transfer.body_stream import announced_length, append, check_room, compl
 from api.transfer.multipart import FORM, form
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.open_recording import TEXT
+from rcsa_ident.plausibility import RATE, SENSOR_MASS, SPINDLE_SPEED
 
 router = APIRouter(tags=["listen"], route_class=Guarded)
 BINARY, CSV, UFF, JSON = "application/octet-stream", "text/csv", "application/x-uff", "application/json"
@@ -33,8 +34,10 @@ _MOST_HITS = 50
 _WORD = r"^[^\x00-\x1f\x7f]{1,128}$"
 Name = Annotated[str, Query(max_length=300, description="Name of the file, where the body is one; its suffix is the format.")]
 Word = Annotated[str | None, Query(pattern=_WORD)]
-Speed = Annotated[float | None, Query(gt=0, le=1e6, allow_inf_nan=False)]
-Rate = Annotated[float | None, Query(gt=0, le=1e8, allow_inf_nan=False, description="Of a file that tells none.")]
+Speed = Annotated[float | None, Query(ge=SPINDLE_SPEED.possible[0], le=SPINDLE_SPEED.possible[1], allow_inf_nan=False)]
+Rate = Annotated[
+    float | None, Query(ge=RATE.possible[0], le=RATE.possible[1], allow_inf_nan=False, description="Of a file that tells none.")
+]
 _ONE: dict[str, Any] = {"type": "string", "format": "binary"}
 
 
@@ -105,7 +108,9 @@ async def tap(
         Query(description="What the response measures where its unit does not say."),
     ] = "acceleration",
     estimator: Literal["h1", "h2", "hv"] = "h1",
-    sensor_mass_g: Annotated[float, Query(ge=0, le=1e5, allow_inf_nan=False, description="Of a sensor at the point that is hit.")] = 0.0,
+    sensor_mass_g: Annotated[
+        float, Query(ge=0, le=SENSOR_MASS.possible[1], allow_inf_nan=False, description="Of a sensor at the point that is hit.")
+    ] = 0.0,
     rate_hz: Rate = None,
 ) -> Any:
     accept = request.headers.get("accept", "")

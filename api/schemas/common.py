@@ -7,6 +7,8 @@ from typing import Annotated, Any, Generic, TypeVar
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
+from rcsa_ident.plausibility import Range
+
 #: Names given by users: no paths, no control characters.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._+()-]{0,63}$"
 ID_PATTERN = r"^[A-Za-z0-9]{1,64}$"
@@ -20,6 +22,11 @@ EngagementRows = Annotated[list[Annotated[list[float], Field(min_length=3, max_l
 MOST_KEYS, MOST_ITEMS = 100, 5000
 Item = TypeVar("Item")
 Model = TypeVar("Model", bound=BaseModel)
+
+
+def within(kind: Range) -> Any:
+    """Return the limits of a number in its quantity's own unit: what is possible is the library's to say."""
+    return Field(ge=kind.possible[0], le=kind.possible[1])
 
 
 class Body(BaseModel):

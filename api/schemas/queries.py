@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from api.schemas.common import Answer, Body, EngagementRows, Id, Line, Name
+from api.schemas.common import Answer, Body, EngagementRows, Id, Line, Name, within
 from api.schemas.machines import Curve
 from api.schemas.robots import Posed
 from api.schemas.tips import TappedTip
@@ -22,21 +22,22 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.cuts import FEED_DIRECTIONS
 from rcsa_ident.io.engagements import engagement_map_of
 from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.plausibility import AXIAL_DEPTH, INDENTATION, POWER, RUNOUT, SIDE, SPINDLE_SPEED, TORQUE, WEAR_LAND
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.units import from_rpm
 
 MOST_TOOLINGS, MOST_SPEEDS, MOST_TESTED = 12, 5000, 1000
 Angle = Annotated[float, Field(ge=0.0, le=180.0)]
 Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
-Micrometre = Annotated[float, Field(ge=-1000.0, le=1000.0)]
-Side = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+Micrometre = Annotated[float, within(RUNOUT)]
+Side = Annotated[float, within(SIDE)]
 Lean = Annotated[float, Field(ge=-89.0, le=89.0)]
-Land = Annotated[float, Field(ge=0.01, le=1000.0)]
-Pressure = Annotated[float, Field(ge=1e9, le=1e17)]
+Land = Annotated[float, within(WEAR_LAND)]
+Pressure = Annotated[float, within(INDENTATION)]
 Percent = Annotated[float, Field(ge=0.0, le=50.0)]
-Rpm = Annotated[float, Field(ge=100.0, le=200_000.0)]
+Rpm = Annotated[float, within(SPINDLE_SPEED)]
 Hertz = Annotated[float, Field(ge=1.0, le=20_000.0)]
-Depth = Annotated[float, Field(gt=0.0, le=500.0)]
+Depth = Annotated[float, within(AXIAL_DEPTH)]
 Tooling = Annotated[Name | ToolingKeys, Field(description="Name in the library, or the tooling itself.")]
 OnMachine = Annotated[Id | None, Field(description="Id of a machine; in its place `robot` takes an arm at a posture.")]
 OnRobot = Annotated[Posed | None, Field(description="In place of a machine.")]
@@ -382,8 +383,8 @@ class AdviceQuery(Milled):
         }
     )
 
-    max_power_kw: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
-    max_torque_nm: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
+    max_power_kw: Annotated[float, within(POWER)] | None = None
+    max_torque_nm: Annotated[float, within(TORQUE)] | None = None
     max_speed_rpm: Rpm | None = None
     tolerance_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 1.0
     probability_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 95.0

@@ -6,11 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from api.schemas.common import Answer, Body
+from api.schemas.common import Answer, Body, within
 from api.schemas.queries import Tooling
 from api.schemas.toolings import EXAMPLE, ToolingKeys
+from rcsa_ident.plausibility import RATE
 
-Rate = Annotated[float, Field(gt=0.0, le=1e8)]
+Rate = Annotated[float, within(RATE)]
 
 
 class RingQuery(Body):

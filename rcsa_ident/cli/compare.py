@@ -59,9 +59,12 @@ def compare(
     if out is not None:
         writable(out)
     tests: dict[tuple[Place, Dof], Any] = {}
+    assumed: dict[str, None] = {}
     for text in hammer:
         place, path = labelled(text, Place.TIP, [str(p) for p in Place])
-        for axis, (frequency, values) in read_hammer(path, place).values.items():
+        for axis, curve in read_hammer(path, place).values.items():
+            frequency, values = curve
+            assumed |= dict.fromkeys(curve.remarks)
             key = (Place(place), Dof(axis.lower()))
             if key in tests:
                 raise InputError("--hammer", f"two tests {place} {axis}", "one for each place and axis", str(path))
@@ -79,8 +82,11 @@ def compare(
     if json_:
         rpm = None if there is None else to_rpm(there)
         rows = [_row(each) for each in found]
-        emit({"responses": rows, "spindle_speed_rpm": rpm, "seconds": stages.seconds, "out": None if out is None else str(out)})
+        told = {"responses": rows, "spindle_speed_rpm": rpm, "warnings": list(assumed), "seconds": stages.seconds}
+        emit(told | {"out": None if out is None else str(out)})
         return
+    for remark in assumed:
+        warn(remark)
     _show(found)
     if there is not None:
         say(f"identified at {to_rpm(there):.0f} rev/min{'' if omega is not None else ', the middle of the speeds that were cut'}")

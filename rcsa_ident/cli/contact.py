@@ -98,14 +98,15 @@ def _taps(tooling: Path, texts: list[str], on: Path | None, low: float, high: fl
         label, path = labelled(text, str(tooling))
         assembly = read_tooling(label).assembly
         values = read_hammer(path).values
-        for axis, (frequency, receptance) in values.items():
+        for axis, curve in values.items():
+            frequency, receptance = curve
             if on is not None and Dof(axis.lower()) not in supports:
                 raise InputError("--tap", f"axis {axis}", f"an axis of {on}", str(path))
             support = supports.get(Dof(axis.lower()))
             kept = np.asarray(frequency) > 0.0
             name = path.name if len(values) == 1 else f"{path.name} {axis}"
             band = (from_hz(low), from_hz(last))
-            taps.append(TapTest(name, assembly, from_hz(frequency[kept]), receptance[kept], support, band=band))
+            taps.append(TapTest(name, assembly, from_hz(frequency[kept]), receptance[kept], support, band=band, remarks=curve.remarks))
     return taps
 
 

@@ -143,7 +143,8 @@ def axial(
     source = frf_source(frf)
     if source.pair not in (None, _ALONG):
         raise InputError("FRF", "".join(source.pair), "a test along Z, force and response", str(source.path))
-    frequency, values = read_tap_tests([source._replace(pair=_ALONG)], frf_units)[_ALONG]
+    curve = read_tap_tests([source._replace(pair=_ALONG)], frf_units)[_ALONG]
+    frequency, values = curve
     kept = (frequency >= positive("--from", from_, "Hz")) & (frequency <= (math.inf if to is None else positive("--to", to, "Hz")))
     learnt = axial_flange_from_tap(tapped, from_hz(frequency[kept]), values[kept])
     if measured:
@@ -154,7 +155,7 @@ def axial(
         identified, told = read_identified(result)
         band = identified.band
         write_result(out, told | {"axial": axial_to_json(learnt)})
-    remarks = learnt.remarks(band)
+    remarks = (*curve.remarks, *learnt.remarks(band))
     tip = learnt.receptance(from_hz(frequency[kept])).values[:, 0, 0]
     stiffness = float(1.0 / np.abs(tip[0]))
     if json_:
@@ -187,9 +188,10 @@ def _taps(texts: list[str], low: float, high: float) -> dict[Dof, list[FlangeTap
             raise InputError("--tap", text, "TOOLING.toml=FRF or PLACE:TOOLING.toml=FRF")
         if tooling not in assemblies:
             assemblies[tooling] = read_tooling(tooling).assembly
-        for axis, (frequency, values) in read_hammer(path).values.items():
+        for axis, curve in read_hammer(path).values.items():
+            frequency, values = curve
             kept = (np.asarray(frequency) >= low) & (np.asarray(frequency) <= high)
-            own = FlangeTap(Path(path).name, assemblies[tooling], Place(place), from_hz(frequency[kept]), values[kept])
+            own = FlangeTap(Path(path).name, assemblies[tooling], Place(place), from_hz(frequency[kept]), values[kept], curve.remarks)
             found.setdefault(Dof(axis.lower()), []).append(own)
     complete = {axis: own for axis, own in found.items() if len(own) == len(texts)}
     if not complete:

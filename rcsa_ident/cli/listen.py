@@ -55,7 +55,7 @@ def listen(
         with stages.stage(str(path)):
             opened = open_recording(path, channel, rate_hz)
             try:
-                measured, channels = opened.of(told, channel)
+                measured, channels, assumed = opened.of(told, channel)
                 speed = None if speed_rpm is None else from_rpm(speed_rpm)
                 answer = listen_to(opened.rate, [each.samples for each in channels], measured, teeth, speed, between, path.name)
             except InputError as error:
@@ -64,7 +64,7 @@ def listen(
             from rcsa_ident.report.listening import listening_figure
 
             listening_figure(answer).savefig(plot, dpi=150)
-        answers_.append({"recording": str(path)} | listening_row(answer, [each.name for each in channels], opened.remarks))
+        answers_.append({"recording": str(path)} | listening_row(answer, [each.name for each in channels], assumed))
         if not json_:
             _show(answers_[-1])
     if json_:

@@ -124,7 +124,7 @@ def compensate(
         )
     if joints is not None:
         writable(joints, "--joints")
-    warnings = _other_times(force, told)
+    warnings = [*told.remarks, *_other_times(force, told)]
     with stages.stage("compensation"):
         if arm:
             if posture is None:

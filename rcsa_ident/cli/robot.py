@@ -180,7 +180,7 @@ def map_(
                 "postures_deg": np.degrees(postures).tolist(),
                 "best_speed_rpm": to_rpm(float(change.speeds[best])),
                 "limit_everywhere_mm": depth,
-                "warnings": list(machine.remarks),
+                "warnings": [*along.remarks, *machine.remarks],
                 "seconds": stages.seconds,
                 "out": str(out),
             }
@@ -188,7 +188,7 @@ def map_(
         return
     told = f"deeper than {1e3 * change.max_depth:g} mm" if depth is None else f"{depth:.2f} mm"
     say(f"at {to_rpm(float(change.speeds[best])):.0f} rev/min every place is stable up to {told}")
-    for remark in machine.remarks:
+    for remark in (*along.remarks, *machine.remarks):
         warn(remark)
     say(f"written: {out} ({len(along)} places, {change.speeds.size} speeds, {stages.seconds['limits']:.2f} s)")
 

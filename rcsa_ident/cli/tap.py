@@ -67,7 +67,7 @@ def tap(
     mass = 1e-3 * non_negative("--sensor-mass-g", sensor_mass_g, "g")
     wanted = [name for name in (force, response) if name]
     opened = [open_recording(path, wanted, rate_hz) for path in hits]
-    found, said = tap_recordings(opened, force, response, quantity.value, HitEstimator(estimator), mass, axis.value)
+    found = tap_recordings(opened, force, response, quantity.value, HitEstimator(estimator), mass, axis.value)
     write_tap(out, found)
     if plot is not None:
         from rcsa_ident.report.tap import tap_figure
@@ -75,10 +75,10 @@ def tap(
         tap_figure(found).savefig(plot, dpi=150)
     left_out = [(hit, hits[hit.record].name) for hit in found.hits if hit.reason]
     if json_:
-        emit(tap_row(found, [str(path) for path in hits], said) | {"out": str(out)})
+        emit(tap_row(found, [str(path) for path in hits]) | {"out": str(out)})
         return
-    for remark in said:
-        say(remark)
+    for remark in found.remarks:
+        warn(remark)
     for hit, name in left_out:
         warn(f"{name}, hit at {hit.time:.3g} s is left out: {hit.reason}")
     if found.window_decay:

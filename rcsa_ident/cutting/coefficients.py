@@ -6,9 +6,38 @@ import math
 from dataclasses import dataclass, replace
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL, Range, remarks_of
+from rcsa_ident.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL, remarks_of
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
+
+#: What each field is called in messages, and its range; the others are how well these are known.
+_RANGES = {
+    "tangential": ("tangential coefficient", TANGENTIAL),
+    "radial_ratio": ("radial_ratio", RADIAL_RATIO),
+    "axial_ratio": ("axial_ratio", AXIAL_RATIO),
+    "tangential_edge": ("tangential_edge", EDGE),
+    "radial_edge": ("radial_edge", EDGE),
+    "axial_edge": ("axial_edge", EDGE),
+}
+_SPREADS = ("tangential_spread", "ratio_spread", "edge_spread")
+
+
+def checked_coefficient(field: str, value: float) -> float:
+    """Return the value of a field of `CuttingCoefficients` where it is possible.
+
+    Raises
+    ------
+    InputError
+        The field is unknown, or the value impossible.
+    """
+    if field in _RANGES:
+        name, kind = _RANGES[field]
+        return kind.checked(name, value)
+    if field not in _SPREADS:
+        raise InputError("coefficients", field, f"one of {', '.join((*_RANGES, *_SPREADS))}")
+    if not 0.0 <= value <= 1.0:
+        raise InputError(field, value, "a share from 0 to 1")
+    return value
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -44,11 +73,8 @@ class CuttingCoefficients(Shown):
     edge_spread: float = 0.1
 
     def __post_init__(self) -> None:
-        for name, kind, value in self._values:
-            kind.checked(name, value)
-        for name in ("tangential_spread", "ratio_spread", "edge_spread"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise InputError(name, getattr(self, name), "a share from 0 to 1")
+        for name in (*_RANGES, *_SPREADS):
+            checked_coefficient(name, getattr(self, name))
 
     def after(self, tangential: tuple[float, float], ratio: tuple[float, float]) -> CuttingCoefficients:
         """Return the same, as well known as cuts have left them.
@@ -70,18 +96,7 @@ class CuttingCoefficients(Shown):
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What is unusual about them, as a wrong unit would make it."""
-        return tuple(remarks_of(self._values))
-
-    @property
-    def _values(self) -> tuple[tuple[str, Range, float], ...]:
-        return (
-            ("tangential coefficient", TANGENTIAL, self.tangential),
-            ("radial_ratio", RADIAL_RATIO, self.radial_ratio),
-            ("axial_ratio", AXIAL_RATIO, self.axial_ratio),
-            ("tangential_edge", EDGE, self.tangential_edge),
-            ("radial_edge", EDGE, self.radial_edge),
-            ("axial_edge", EDGE, self.axial_edge),
-        )
+        return tuple(remarks_of((name, kind, getattr(self, field)) for field, (name, kind) in _RANGES.items()))
 
     def __str__(self) -> str:
         ratios = {"rc": self.radial_ratio, "ac": self.axial_ratio}

@@ -10,6 +10,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.plausibility import HEIGHT, SIDE, STEPOVER
 from rcsa_ident.shown import Shown
 from rcsa_ident.units import to_rpm
 
@@ -112,6 +113,8 @@ class Block(Shown):
     def __post_init__(self) -> None:
         if not (np.isfinite(self.y_from) and np.isfinite(self.y_to) and self.y_from < self.y_to):
             raise InputError("y_from and y_to", (self.y_from, self.y_to), "two finite places, the first one smaller [m]")
+        SIDE.checked("y_from", self.y_from)
+        SIDE.checked("y_to", self.y_to)
 
     def arcs(self, r: FloatArray, z: FloatArray) -> FloatArray:
         """Return start and end of the arcs at points of the edge, shape (k, n, 2) [rad]; empty ones end where they begin."""
@@ -149,7 +152,7 @@ class Stepover(Shown):
     strategy: str
 
     def __post_init__(self) -> None:
-        positive("width", self.width, "m")
+        STEPOVER.checked("width", self.width)
         if self.strategy not in ("up", "down"):
             raise InputError("strategy", self.strategy, "up or down")
 
@@ -203,6 +206,7 @@ class EngagementMap(Shown):
             )
         if not np.all(np.isfinite(self.z)) or np.any(np.diff(self.z) < 0.0) or self.z[0] < 0.0:
             raise InputError("engagement map heights", self.z.tolist(), "heights of 0 or more that never fall [m]")
+        HEIGHT.checked("engagement map heights", float(self.z[-1]))
         if not np.all((self.start >= 0.0) & (self.start <= self.end) & (self.end <= 2.0 * np.pi + 1e-9)):
             raise InputError(
                 "engagement map angles", "an arc outside 0 to 360 degrees or with its end before its start", "0 <= start <= end"

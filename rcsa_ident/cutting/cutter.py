@@ -13,7 +13,8 @@ from rcsa_ident.cutting.outlines import Dimensions, key_of, missing
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.cutting.shape import IGNORED_CORNER, CutterShape, cylinder_remark
-from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.errors import InputError, non_negative
+from rcsa_ident.plausibility import DIAMETER, HELIX, RUNOUT, TEETH, Range
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 
@@ -85,7 +86,7 @@ class Cutter(Shown):
     def __post_init__(self) -> None:
         if isinstance(self.teeth, bool) or int(self.teeth) != self.teeth or not 1 <= self.teeth <= 100:
             raise InputError("teeth", self.teeth, "a whole number from 1 to 100")
-        positive("diameter", self.diameter, "m")
+        DIAMETER.checked("diameter", self.diameter)
         object.__setattr__(self, "helix", self._checked_helix())
         equal = np.full(self.teeth, 2.0 * np.pi / self.teeth)
         pitch = frozen(equal if self.pitch is None else self.pitch)
@@ -94,6 +95,8 @@ class Cutter(Shown):
             raise InputError("pitch", pitch.tolist(), f"{self.teeth} positive angles that add up to a full turn")
         if runout.shape != (self.teeth,) or not np.all(np.isfinite(runout)):
             raise InputError("runout", runout.tolist(), f"{self.teeth} finite radial offsets [m]")
+        for offset in runout.tolist():
+            RUNOUT.checked("runout", offset)
         if self.shape not in tuple(CutterShape):
             raise InputError("shape", self.shape, f"one of {', '.join(CutterShape)}")
         shape = CutterShape(self.shape)
@@ -103,6 +106,8 @@ class Cutter(Shown):
         axial = frozen(np.zeros(self.teeth) if self.axial_runout is None else self.axial_runout)
         if axial.shape != (self.teeth,) or not np.all(np.isfinite(axial)):
             raise InputError("axial_runout", axial.tolist(), f"{self.teeth} finite axial offsets [m]")
+        for offset in axial.tolist():
+            RUNOUT.checked("axial_runout", offset)
         if not abs(self.tilt) <= 0.02:
             raise InputError("tilt", self.tilt, "an angle from -0.02 to 0.02 [rad]")
         if self.helix_kind not in tuple(HelixKind):
@@ -125,6 +130,17 @@ class Cutter(Shown):
         if each.shape != (self.teeth,) or not np.all((each >= 0.0) & (each < _STEEPEST)):
             raise InputError("helix", np.degrees(each).tolist(), f"one angle, or {self.teeth} of them, 0 to 81 degrees")
         return each if np.ptp(each) > 0.0 else float(each[0])
+
+    @property
+    def values(self) -> tuple[tuple[str, Range, float], ...]:
+        """What may be unusual about it: field, range and value, named as in a tooling's file."""
+        ends = {float(end) for offsets in (self.runout, self.axial_runout) for end in (offsets.min(), offsets.max())}
+        return (
+            ("cutter.teeth", TEETH, self.teeth),
+            ("cutter.diameter_mm", DIAMETER, self.diameter),
+            ("cutter.helix_deg", HELIX, float(self.helices.max())),
+            *(("cutter run-out", RUNOUT, end) for end in sorted(ends)),
+        )
 
     @property
     def helices(self) -> FloatArray:

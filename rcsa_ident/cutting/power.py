@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.plausibility import POWER, SPINDLE_SPEED, TORQUE, Range, remarks_of
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 from rcsa_ident.units import to_rpm
 
@@ -109,6 +112,21 @@ class SpindleDrive(Shown):
             raise InputError("speed", self.speed.tolist(), "finite, increasing speeds [rad/s]")
         if not self.max_speed > 0.0:
             raise InputError("max_speed", self.max_speed, "a speed above 0 [rad/s]")
+        for name, kind, value in self._values:
+            kind.checked(name, value)
+
+    @property
+    def _values(self) -> Iterator[tuple[str, Range, float]]:
+        """The limits that are known: field, range and value."""
+        for name, kind in (("power", POWER), ("torque", TORQUE), ("max_speed", SPINDLE_SPEED)):
+            values = np.atleast_1d(getattr(self, name))
+            known = values[np.isfinite(values)]
+            yield from ((name, kind, value) for value in sorted({known.min(), known.max()} if known.size else set()))
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about it, as a wrong unit would make it."""
+        return tuple(dict.fromkeys(remarks_of(self._values)))
 
     @classmethod
     def flat(cls, power: float | None = None, torque: float | None = None, max_speed: float | None = None) -> SpindleDrive:

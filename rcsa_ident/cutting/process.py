@@ -10,8 +10,8 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import AnyEngagement, CuttingConditions, Engagement, EngagementProfile, feed_direction, widest
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.teeth import deepest
-from rcsa_ident.errors import InputError, non_negative, positive
-from rcsa_ident.plausibility import FEED_PER_TOOTH, IMMERSION, remarks_of
+from rcsa_ident.errors import InputError, non_negative
+from rcsa_ident.plausibility import FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, INDENTATION, WEAR_LAND, Range, remarks_of
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 
@@ -53,10 +53,15 @@ class ProcessDamping(Shown):
     friction: float = 0.3
 
     def __post_init__(self) -> None:
-        positive("indentation", self.indentation, "N/m^3")
-        positive("wear_land", self.wear_land, "m")
+        INDENTATION.checked("indentation", self.indentation)
+        WEAR_LAND.checked("wear_land", self.wear_land)
         if not 0.0 <= non_negative("friction", self.friction) <= 2.0:
             raise InputError("friction", self.friction, "a coefficient from 0 to 2")
+
+    @property
+    def values(self) -> tuple[tuple[str, Range, float], ...]:
+        """What may be unusual about it: field, range and value."""
+        return ("indentation", INDENTATION, self.indentation), ("wear_land", WEAR_LAND, self.wear_land)
 
     @property
     def strength(self) -> float:
@@ -145,16 +150,17 @@ class MillingProcess(Shown):
     engagement_profile: EngagementProfile | None = None
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.feed_angle):
-            raise InputError("feed_angle", self.feed_angle, "a finite angle [rad]")
+        FEED_ANGLE.checked("feed_angle", self.feed_angle)
         if self.feed_per_tooth is not None:
             FEED_PER_TOOTH.checked("feed_per_tooth", self.feed_per_tooth)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What is unusual about coefficients, feed and immersion, as a wrong unit would make it."""
+        """What is unusual about coefficients, feed, immersion and cutter, as a wrong unit would make it."""
         feed = () if self.feed_per_tooth is None else (("feed_per_tooth", FEED_PER_TOOTH, self.feed_per_tooth),)
-        return *self.coefficients.remarks, *remarks_of((*feed, ("radial immersion", IMMERSION, self.widest.immersion)))
+        damping = () if self.damping is None else self.damping.values
+        immersion = ("radial immersion", IMMERSION, self.widest.immersion)
+        return *self.coefficients.remarks, *remarks_of((*feed, immersion, *damping, *self.cutter.values))
 
     @property
     def is_plain(self) -> bool:

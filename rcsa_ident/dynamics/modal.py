@@ -16,6 +16,8 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.shown import Shown
 
+_FREQUENCIES = "finite natural frequencies above 0 [rad/s]"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoleModel:
@@ -103,7 +105,7 @@ class ModalModel(Shown):
         if self.residual.shape != (d, d):
             raise InputError("residual", self.residual.shape, f"shape {(d, d)}")
         if not np.all(np.isfinite(self.omega_n) & (self.omega_n > 0.0)):
-            raise InputError("omega_n", self.omega_n.tolist(), "finite natural frequencies above 0 [rad/s]")
+            raise InputError("omega_n", self.omega_n.tolist(), _FREQUENCIES)
         if self.zeta.shape != (m,) or not np.all((self.zeta > 0.0) & (self.zeta <= 1.0)):
             raise InputError("zeta", self.zeta.tolist(), f"{m} damping ratios above 0 and not above 1")
 
@@ -186,6 +188,8 @@ def normal_modes(
     omega_n, zeta, psi = (np.asarray(a, dtype=float) for a in (omega_n, zeta, psi))
     if not np.all((zeta > 0.0) & (zeta < 1.0)):
         raise InputError("zeta", zeta.tolist(), "damping ratios above 0 and below 1")
+    if not np.all(np.isfinite(omega_n) & (omega_n > 0.0)):
+        raise InputError("omega_n", omega_n.tolist(), _FREQUENCIES)
     omega_d = omega_n * np.sqrt(1.0 - zeta**2)
     phi = psi * ((1.0 - 1.0j) / (2.0 * np.sqrt(omega_d)))[:, None]
     d = len(coordinates)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -11,7 +11,32 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Drawn
+
+
+class MeasuredCurve(tuple[FloatArray, ComplexArray]):
+    """Frequencies [Hz] and receptance [m/N] of one FRF, shape (n,) both, that also says what its reader assumed.
+
+    Parameters
+    ----------
+    frequency : array, shape (n,) [Hz]
+    values : complex array, shape (n,) [m/N]
+    remarks : tuple of Remark
+    """
+
+    remarks: tuple[Remark, ...]
+
+    def __new__(cls, frequency: FloatArray, values: ComplexArray, remarks: Iterable[Remark] = ()) -> MeasuredCurve:
+        """Return the pair with its remarks."""
+        made = super().__new__(cls, (frequency, values))
+        made.remarks = tuple(remarks)
+        return made
+
+
+def assumed_of(curves: Iterable[tuple[FloatArray, ComplexArray]]) -> tuple[Remark, ...]:
+    """Return what the readers of curves assumed, each remark once."""
+    return tuple(dict.fromkeys(remark for curve in curves if isinstance(curve, MeasuredCurve) for remark in curve.remarks))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

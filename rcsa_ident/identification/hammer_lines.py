@@ -9,6 +9,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import Remark
 
 #: Lines that a test has at least.
 FEWEST_LINES = 20
@@ -41,6 +42,8 @@ class HammerLines:
         Fixed to the tool-holder where the response is measured.
     standstill : bool
         The spindle did not turn.
+    remarks : tuple of Remark
+        What the file does not state and was assumed.
     """
 
     id: str
@@ -53,6 +56,7 @@ class HammerLines:
     force: float | None
     sensor_mass: float = 0.0
     standstill: bool = True
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "omega", frozen(self.omega))

@@ -15,7 +15,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.receptance import MeasuredCurve, Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import AXES, FREQUENCY, read_frf_csv
 from rcsa_ident.io.files import MEGABYTE, read_bytes
@@ -32,6 +32,8 @@ from rcsa_ident.io.uff import (
 )
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.machine.known_tip import measured_tip
+from rcsa_ident.remarks import Remark
+from rcsa_ident.signals.verdict import RecordCode, assumed
 
 _STANDARD_GRAVITY = 9.80665
 _INCH = 0.0254
@@ -66,6 +68,8 @@ class TapTest(NamedTuple):
         What the file calls the two places, as ``1 / 1``.
     where : str
         File and line.
+    remarks : tuple of Remark
+        What the file does not state and was assumed.
     """
 
     frequency: FloatArray
@@ -75,6 +79,7 @@ class TapTest(NamedTuple):
     record: int
     point: str
     where: str
+    remarks: tuple[Remark, ...] = ()
 
 
 class Source(NamedTuple):
@@ -94,10 +99,8 @@ class Source(NamedTuple):
     record: int | None = None
 
 
-def read_tap_tests(
-    sources: Sequence[Source], units: str | None = None, from_hz: float = 0.0
-) -> dict[tuple[str, str], tuple[FloatArray, ComplexArray]]:
-    """Return the tip's FRFs: frequency [Hz] and receptance [m/N] for each pair of axes (response, force).
+def read_tap_tests(sources: Sequence[Source], units: str | None = None, from_hz: float = 0.0) -> dict[tuple[str, str], MeasuredCurve]:
+    """Return the tip's FRFs for each pair of axes (response, force).
 
     Parameters
     ----------
@@ -112,7 +115,7 @@ def read_tap_tests(
     InputError
         Names the file and the line or the record.
     """
-    found: dict[tuple[str, str], tuple[FloatArray, ComplexArray]] = {}
+    found: dict[tuple[str, str], MeasuredCurve] = {}
     for source in sources:
         for pair, test in _wanted(read_frfs(source.path, units), source).items():
             if pair in found:
@@ -120,7 +123,8 @@ def read_tap_tests(
             kept = test.frequency >= from_hz
             if np.count_nonzero(kept) < 2:
                 raise InputError("frf_from_hz", f"{from_hz:g}", f"a frequency below the last, {test.frequency[-1]:g} Hz", test.where)
-            found[pair] = test.frequency[kept], test.values[kept]
+            said = (remark.of(f"FRF {pair_name(pair)}") for remark in test.remarks)
+            found[pair] = MeasuredCurve(test.frequency[kept], test.values[kept], said)
     return found
 
 
@@ -244,13 +248,25 @@ def _from_uff(path: str | Path, scale: tuple[float, int] | None) -> list[TapTest
             raise InputError("dataset 58", "an FRF of real numbers", "complex numbers (data type 5 or 6)", function.where)
         sign = 1.0 if function.response[1] * function.reference[1] >= 0 else -1.0
         own = scale if scale is not None else _scale_of(function)
+        said = _assumed_of(function, scale is not None)
         frequency, values = _receptance(function.abscissa, sign * function.values, own, function.where)
         place = f"{function.response[0]} / {function.reference[0]}"
-        found.append(TapTest(frequency, values, _axis(function.response), _axis(function.reference), i, place, function.where))
+        found.append(TapTest(frequency, values, _axis(function.response), _axis(function.reference), i, place, function.where, said))
     if not found:
         kinds = listed(list(dict.fromkeys(KINDS.get(f.kind, f"type {f.kind}") for f in functions)))
         raise InputError("universal file", f"functions of another kind ({kinds})", "frequency response functions (type 4)", str(path))
     return found
+
+
+def _assumed_of(function: UffFunction, units_known: bool) -> tuple[Remark, ...]:
+    """What a function's header does not state."""
+    said = []
+    if not (units_known or function.system or function.ordinate.unit or function.denominator.unit):
+        said.append(assumed("the function", "", "SI (no labels, no dataset 164)"))
+    if not (function.response[1] and function.reference[1]):
+        words = "the function states no direction of response or force: both are assumed to point the same way"
+        said.append(Remark(RecordCode.ASSUMED, words))
+    return tuple(said)
 
 
 def _axis(place: tuple[int, int]) -> str:
@@ -312,8 +328,9 @@ def _from_columns(path: str | Path, scale: tuple[float, int] | None) -> list[Tap
     if table[-1, 0] < _LOWEST_END and len(rows) > table[-1, 0] - table[0, 0] > 0:
         found = f"{len(rows)} lines up to {table[-1, 0]:g}"
         raise InputError("FRF", f"{found}: samples over time?", "frequencies [Hz] of a machine; hits of a hammer are read by tap", where)
-    frequency, values_ = _receptance(table[:, 0], table[:, 1] + 1j * table[:, 2], scale or _unit_in(names), where)
-    return [TapTest(frequency, values_, "", "", 1, "", where)]
+    own = scale or _unit_in(names)
+    frequency, values_ = _receptance(table[:, 0], table[:, 1] + 1j * table[:, 2], own or (1.0, 0), where)
+    return [TapTest(frequency, values_, "", "", 1, "", where, () if own else (assumed("the table", "", "receptance [m/N]"),))]
 
 
 def _as_float(text: str) -> float | None:
@@ -323,11 +340,11 @@ def _as_float(text: str) -> float | None:
         return None
 
 
-def _unit_in(names: str) -> tuple[float, int]:
-    """The first unit of a motion over a force among the names of a text file, m/N without one."""
+def _unit_in(names: str) -> tuple[float, int] | None:
+    """The first unit of a motion over a force among the names of a text file, None without one."""
     for word in re.split(r"[\s,;]+", names):
         try:
             return parse_units(word)
         except InputError:
             continue
-    return 1.0, 0
+    return None

@@ -16,6 +16,7 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
 from rcsa_ident.io.gcode_blocks import KINDS, block_of, words_of
 from rcsa_ident.io.text_columns import decoded
+from rcsa_ident.signals.verdict import assumed
 from rcsa_ident.toolpath.arcs import centre_of, chord_count, chords, turned
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from rcsa_ident.units import from_rpm, to_rpm
@@ -158,7 +159,7 @@ class _Program:
         self.lost: dict[int, int] = {}
         self.highest = -math.inf
         self.motion: float | None = None
-        self.plane, self.unit = 17.0, 1.0
+        self.plane, self.unit, self.unit_told = 17.0, 1.0, False
         self.absolute, self.absolute_centres = True, False
         self.system: float | None = None
         self.feed, self.speed, self.turning = math.nan, math.nan, True
@@ -187,7 +188,7 @@ class _Program:
 
     def _set(self, told: Mapping[str, float], codes: Mapping[str, list[float]], words: Mapping[str, float]) -> None:
         if "unit" in told:
-            self.unit = _INCH if told["unit"] == 20 else 1.0
+            self.unit, self.unit_told = (_INCH if told["unit"] == 20 else 1.0), True
         self.plane = told.get("plane", self.plane)
         self.absolute = told.get("distance", 90 if self.absolute else 91) == 90
         self.absolute_centres = told.get("centre", 90.1 if self.absolute_centres else 91.1) == 90.1
@@ -337,6 +338,7 @@ class _Program:
             speed=from_rpm(np.array(self.speeds)[kept]),
             tool=tools[kept],
             line=np.array(self.lines)[kept],
+            remarks=() if self.unit_told else (assumed("the program", "", "millimetres (G21)"),),
         )
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import tomlkit
 from tomlkit.items import InlineTable, Table
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.receptance import MeasuredCurve
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import read_bytes, write_text
 from rcsa_ident.io.frf_files import read_frfs
@@ -34,12 +34,12 @@ class HammerFile(NamedTuple):
     label : str
         What stood in front of the file's name, or the default.
     path : Path
-    values : dict of axis to (array, complex array), shapes (n,) [Hz] and (n,) [m/N]
+    values : dict of axis to MeasuredCurve
     """
 
     label: str
     path: Path
-    values: dict[str, tuple[FloatArray, ComplexArray]]
+    values: dict[str, MeasuredCurve]
 
 
 def labelled(text: str, default: str, known: Collection[str] = ()) -> tuple[str, Path]:
@@ -74,7 +74,7 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
         The file holds no such function, or several of one axis.
     """
     path = Path(path)
-    found: dict[str, tuple[FloatArray, ComplexArray]] = {}
+    found: dict[str, MeasuredCurve] = {}
     tests = read_frfs(path)
     for test in tests:
         axis = test.response or (path.stem[-1:].upper() if len(tests) == 1 else "")
@@ -82,7 +82,7 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
             continue
         if axis in found:
             raise InputError("FRF", f"two FRFs with response and force in {axis}", "one for each axis", str(path))
-        found[axis] = (test.frequency, test.values)
+        found[axis] = MeasuredCurve(test.frequency, test.values, (remark.of(path.name) for remark in test.remarks))
     if not found:
         names = listed([f"{t.response or '?'}/{t.force or '?'}" for t in tests])
         raise InputError("FRF", names, "response/force X/X or Y/Y, or a single FRF in a file whose name ends in x or y", str(path))
@@ -138,8 +138,8 @@ def write_calibrated_tooling(
     write_text(target, tomlkit.dumps(document))
 
 
-def read_hammer_test(test: HammerTest) -> tuple[FloatArray, ComplexArray]:
-    """Return the frequencies [Hz] and the receptance [m/N] of a test's file, shape (n,) both.
+def read_hammer_test(test: HammerTest) -> MeasuredCurve:
+    """Return the frequencies [Hz] and the receptance [m/N] of a test's file, shape (n,) both, with what was assumed.
 
     Raises
     ------
@@ -155,4 +155,4 @@ def read_hammer_test(test: HammerTest) -> tuple[FloatArray, ComplexArray]:
     if len(found) != 1:
         told = "no such record" if not found else f"{len(found)} FRFs"
         raise InputError("record", told, "the number of one FRF of the file", str(test.file))
-    return found[0].frequency, found[0].values
+    return MeasuredCurve(found[0].frequency, found[0].values, (remark.of(test.id) for remark in found[0].remarks))

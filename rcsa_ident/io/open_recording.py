@@ -10,6 +10,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import RATE, notes_of
 from rcsa_ident.io.recordings import READERS, SOUND, read_signals
 from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, name_and_unit, of_unit, told_table
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.verdict import RecordCode
 
@@ -79,4 +80,5 @@ def _sound(path: Path, names: Sequence[str], suffix: str) -> OpenRecording:
     rate, signals = read_signals(path, wanted, suffix=suffix)
     channels = tuple(OpenChannel(name, "", Quantity.SOUND, signal[:]) for name, signal in zip(wanted, signals, strict=True))
     lossy = any(note.code is RecordCode.LOSSY for note in notes_of(signals))
-    return OpenRecording(rate, channels, () if names else ("taken as sound, the first channel of the file",), lossy)
+    first = Remark(RecordCode.ASSUMED, "taken as sound, the first channel of the file")
+    return OpenRecording(rate, channels, () if names else (first,), lossy)

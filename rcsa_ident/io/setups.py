@@ -23,6 +23,7 @@ from rcsa_ident.plausibility import (
     LOSS_FACTOR,
     MODULUS,
     SEGMENT_DIAMETER,
+    SEGMENT_LENGTH,
     STICKOUT,
 )
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
@@ -165,7 +166,7 @@ def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamS
 
 
 def _segment(table: Table, materials: Mapping[str, Material]) -> BeamSegment:
-    length = table.number("length_mm", "mm", above=0.0, most=5000.0)
+    length = table.number("length_mm", "mm", above=0.0, most=SEGMENT_LENGTH.possible[1])
     outer = table.quantity("outer_diameter_mm", SEGMENT_DIAMETER)
     end = table.quantity("end_diameter_mm", SEGMENT_DIAMETER, None)
     inner = table.number("inner_diameter_mm", "mm", 0.0, least=0.0)

@@ -19,11 +19,12 @@ from rcsa_ident.io.text_columns import DELIMITERS, LARGEST_TEXT, decoded
 from rcsa_ident.io.time_base import Irregular, uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
-from rcsa_ident.signals.recording import Quantity
-from rcsa_ident.signals.verdict import RecordCode
+from rcsa_ident.signals.recording import SI_UNITS, Quantity
+from rcsa_ident.signals.verdict import RecordCode, assumed
 
 #: A time column, and its unit in seconds.
 _TIME = re.compile(r"^\s*(?:time|t|timestamp|zeit|abscissa)\b", re.IGNORECASE)
+_TIME_IN_SECONDS = ("time_s", "t_s")
 _SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
 #: ``name (unit)`` and ``name [unit]``.
 _NAME_AND_UNIT = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
@@ -67,19 +68,22 @@ class OpenRecording:
     ----------
     rate : float [Hz]
     channels : tuple of OpenChannel
-    remarks : tuple of str
-        What was guessed, in sentences.
+    remarks : tuple of Remark
+        What was assumed.
     lossy : bool
         Compressed with loss: lines stay where they are, decays do not.
     """
 
     rate: float
     channels: tuple[OpenChannel, ...]
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     lossy: bool = False
 
-    def of(self, quantity: Quantity | None = None, names: Sequence[str] = ()) -> tuple[Quantity, tuple[OpenChannel, ...]]:
-        """Return the channels of one quantity: those that are named, or all of the first quantity of acceleration, sound, force and motion.
+    def of(
+        self, quantity: Quantity | None = None, names: Sequence[str] = ()
+    ) -> tuple[Quantity, tuple[OpenChannel, ...], tuple[Remark, ...]]:
+        """Return the channels of one quantity, and what was assumed: those that are named, or all of the first quantity of acceleration,
+        sound, force and motion.
 
         Raises
         ------
@@ -100,7 +104,8 @@ class OpenRecording:
         if not kept:
             found = listed([f"{each.name} [{each.unit}]" for each in chosen])
             raise InputError("quantity", found, f"a channel that measures {quantity}")
-        return quantity, kept
+        units = tuple(assumed(each.name, each.unit, f"{quantity} [{SI_UNITS[quantity]}]") for each in kept if each.quantity is None)
+        return quantity, kept, (*self.remarks, *units)
 
 
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, Sequence[Channel]]:
@@ -122,8 +127,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     opened = told_table(path, default_rate, names)
     present = [each.name for each in opened.channels]
     channels = [opened.channels[the_only(name, present, "")] for name in names]
-    notes = tuple(Remark(RecordCode.ASSUMED, each) for each in opened.remarks)
-    return opened.rate, Signals([each.samples for each in channels], notes, tuple((each.unit, each.quantity) for each in channels))
+    return opened.rate, Signals([each.samples for each in channels], opened.remarks, tuple((each.unit, each.quantity) for each in channels))
 
 
 def _has_preamble(path: Path) -> bool:
@@ -163,11 +167,13 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
     names, units, rate = _header(lines[:start], delimiter, width, wanted)
     cycles = [i for i in range(start, len(lines)) if _CYCLE.match(lines[i])]
     values = _numbers(lines[: cycles[0] if cycles else None], start, delimiter, comma, width, where)
-    remarks = [_FIRST_CYCLE.format(len(cycles) + 1)] if cycles else []
+    remarks = [Remark(RecordCode.ASSUMED, _FIRST_CYCLE.format(len(cycles) + 1))] if cycles else []
     time = [i for i, name in enumerate(names) if _TIME.match(name)]
+    if time and not units[time[0]] and names[time[0]].lower() not in _TIME_IN_SECONDS:
+        remarks.append(assumed(names[time[0]], "", "time [s]"))
     if not time and default_rate is None and rate is None and np.all(np.diff(values[:, 0]) > 0.0):
         time = [0]
-        remarks.append(f"{names[0]}, which rises throughout, was taken as the time [s]")
+        remarks.append(Remark(RecordCode.ASSUMED, f"{names[0]}, which rises throughout, was taken as the time [s]"))
     if time:
         seconds = _seconds(units[time[0]])
         if seconds is None:
@@ -179,7 +185,8 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
             if even is None:
                 raise InputError(f"column {names[time[0]]}", error.found, error.allowed, f"{where} row {error.row + 1}") from None
             rate, place = even, np.arange(values.shape[0])
-            remarks.append(f"times that stand less than half a sample from their places were taken as even, {rate:.6g} Hz")
+            words = f"times that stand less than half a sample from their places were taken as even, {rate:.6g} Hz"
+            remarks.append(Remark(RecordCode.ASSUMED, words))
         if place[-1] + 1 != place.size:
             full = np.full((place[-1] + 1, width), np.nan)
             full[place] = values

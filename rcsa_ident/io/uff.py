@@ -64,6 +64,8 @@ class UffFunction:
         What the file calls the function, the most particular first: response entity, label of the ordinate, title, place as ``3:-X``.
     step : float
         Of an even abscissa, as the header rounds it to six digits; 0 where the abscissa stands in the file point by point.
+    system : bool
+        Whether the file states its system of units (dataset 164).
     """
 
     kind: int
@@ -79,6 +81,7 @@ class UffFunction:
     where: str = ""
     names: tuple[str, ...] = ()
     step: float = 0.0
+    system: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "abscissa", frozen(self.abscissa))
@@ -97,7 +100,7 @@ def read_uff(path: str | Path) -> list[UffFunction]:
     """
     lines = _Lines(read_bytes(path, "universal file", LARGEST_UFF), str(path))
     found: list[UffFunction] = []
-    factors = (1.0, 1.0)
+    factors: tuple[float, float] | None = None
     while (line := lines.next()) is not None:
         if not line.strip():
             continue
@@ -158,7 +161,7 @@ class _Lines:
         raise InputError("dataset", "the end of the file", "-1 at the end of the dataset", start)
 
 
-def _function(lines: _Lines, binary: bool, head: Sequence[bytes], factors: tuple[float, float]) -> UffFunction:
+def _function(lines: _Lines, binary: bool, head: Sequence[bytes], system: tuple[float, float] | None) -> UffFunction:
     where = lines.here
     title = lines.text().strip()
     for _ in range(4):
@@ -188,8 +191,9 @@ def _function(lines: _Lines, binary: bool, head: Sequence[bytes], factors: tuple
     known = "" if title.upper() == "NONE" else title
     names = [dof[30:41].strip(), labels[1][25:46].strip(), known, _place(*response)]
     names = [name for name in dict.fromkeys(names) if name and name.upper() != "NONE"]
+    factors, spacing = (1.0, 1.0) if system is None else system, step if even else 0.0
     return UffFunction(
-        kind, abscissa, values, response, reference, axes[0], axes[1], axes[2], known, factors, where, tuple(names), step if even else 0.0
+        kind, abscissa, values, response, reference, *axes[:3], known, factors, where, tuple(names), spacing, system is not None
     )
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.receptance import Receptance, assumed_of
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machining_setup import Tooling, Workpiece
+from rcsa_ident.remarks import Remark
 from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
@@ -72,21 +73,24 @@ class KnownTip(TipSource):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Where a measured tip's ends may be the limit: it still gives way at the upper one as below a mode, or the lower one is drift."""
+        """What the files' readers assumed, and where a measured tip's ends may be the limit: it still gives way at the upper one as below
+        a mode, or the lower one is drift."""
         if isinstance(self.known, TipModes):
-            return ()
+            return self.known.remarks
+        said = self.known.assumed if isinstance(self.known, MeasuredTip) else ()
         drifts = tuple(
             f"the receptance in {row.dof.upper()} falls from its first line on and is negative up to {to_hz(drift):.0f} Hz, which is how "
             "an accelerometer's drift looks, not a structure: limits there are the sensor's; leave these lines out"
             for row, drift in zip(self.known.rows, _drifts(self.known), strict=True)
             if drift > 0.0
         )
-        return drifts + tuple(
+        ends = (
             f"the receptance in {row.dof.upper()} ends at {to_hz(self.known.omega[-1]):.0f} Hz with a real part of {1e6 * end:.3g} µm/N, "
             "as below a mode: true limits may be lower, which a measurement up to higher frequencies would tell"
             for row, end in zip(self.known.rows, _ends(self.known), strict=True)
             if end > 0.0
         )
+        return (*said, *drifts, *ends)
 
     def lines(self, beyond: float = 1.0) -> FloatArray:
         """Return the frequencies at which it was measured, or those that resolve its modes."""
@@ -151,9 +155,27 @@ def _drifts(tip: Receptance) -> FloatArray:
     return found
 
 
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MeasuredTip(Receptance):
+    """A tip's receptance from files, and what their readers assumed.
+
+    Parameters
+    ----------
+    omega, values, rows, cols
+        As of a `Receptance`.
+    assumed : tuple of Remark
+    """
+
+    assumed: tuple[Remark, ...] = ()
+
+    def __str__(self) -> str:
+        # a class with slots has no argument-free super()
+        return "; ".join([Receptance.__str__(self), *self.assumed])
+
+
 def measured_tip(
     curves: Mapping[Dof, tuple[FloatArray, ComplexArray]], cross: Mapping[tuple[Dof, Dof], tuple[FloatArray, ComplexArray]] | None = None
-) -> Receptance:
+) -> MeasuredTip:
     """Return the tip's receptance of measured FRFs, over X and Y, and over Z where it is there.
 
     Parameters
@@ -167,9 +189,9 @@ def measured_tip(
     for axis, (frequency, values) in curves.items():
         tip = (Coordinate("tip", axis),)
         planes[axis] = Receptance(from_hz(frequency), np.asarray(values)[:, None, None], tip, tip)
-    both = _with_axial(planes)
+    both, said = _with_axial(planes), assumed_of([*curves.values(), *(cross or {}).values()])
     if not cross:
-        return both
+        return MeasuredTip(both.omega, both.values, both.rows, both.cols, said)
     missing = [axis for axis in dict.fromkeys([Dof.X, Dof.Y, *(axis for pair in cross for axis in pair)]) if axis not in planes]
     if missing:
         raise InputError("cross FRF", f"one without an FRF in {missing[0].upper()}", "FRFs in both directions beside it")
@@ -181,7 +203,7 @@ def measured_tip(
         full[:, places[response], places[force]] = values
         if (force, response) not in cross:
             full[:, places[force], places[response]] = values
-    return Receptance(both.omega, full, both.rows, both.cols)
+    return MeasuredTip(both.omega, full, both.rows, both.cols, said)
 
 
 def _with_axial(planes: Mapping[Dof, Receptance]) -> Receptance:

@@ -467,7 +467,7 @@ def listening_row(answer: Listening, channels: Sequence[str], remarks: Sequence[
     }
 
 
-def tap_row(found: TapFrf, names: Sequence[str], remarks: Sequence[str]) -> dict[str, Any]:
+def tap_row(found: TapFrf, names: Sequence[str]) -> dict[str, Any]:
     """Return what became of hammer hits.
 
     Parameters
@@ -475,13 +475,12 @@ def tap_row(found: TapFrf, names: Sequence[str], remarks: Sequence[str]) -> dict
     found : TapFrf
     names : sequence of str
         Of the recordings, in their order.
-    remarks : sequence of str
     """
     rows = [
         {"recording": names[hit.record], "time_s": hit.time, "force_n": hit.force, "left_out": hit.reason or None} for hit in found.hits
     ]
     band = to_hz(found.omega[[0, -1]]).tolist()
-    return {"hits": rows, "used": found.used, "band_hz": band, "window_decay_per_s": found.window_decay, "remarks": list(remarks)}
+    return {"hits": rows, "used": found.used, "band_hz": band, "window_decay_per_s": found.window_decay, "remarks": list(found.remarks)}
 
 
 def finite(value: float | None, unit: float = 1.0) -> float | None:

@@ -11,6 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.plausibility import RATE
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Drawn
 
@@ -37,6 +38,15 @@ class Quantity(StrEnum):
     TRIGGER = "trigger"
     FORCE = "force"
     SOUND = "sound"
+
+
+#: SI units that a channel has where its file states none.
+SI_UNITS = {
+    Quantity.DISPLACEMENT: "m",
+    Quantity.ACCELERATION: "m/s²",
+    Quantity.FORCE: "N",
+    Quantity.SOUND: "of full scale",
+}
 
 
 class Role(StrEnum):
@@ -119,6 +129,12 @@ class Sensor:
             raise InputError(f"sensors.{self.name}.axis", self.axis, "X, Y or Z" if len(known) == 3 else "X or Y")
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0.0:
             raise InputError(f"sensors.{self.name}.sensitivity", self.sensitivity, "a finite number other than 0")
+        for name, most in (("gain_spread", 0.5), ("cross_talk_spread", 0.5), ("delay_spread", 1e-3)):
+            if not 0.0 <= getattr(self, name) <= most:
+                unit = "s" if name == "delay_spread" else "-"
+                raise InputError(f"sensors.{self.name}.{name}", getattr(self, name), f"a number from 0 to {most:g} [{unit}]")
+        if not abs(self.delay) <= 1.0:
+            raise InputError(f"sensors.{self.name}.delay", self.delay, "a number from -1 to 1 [s]")
         if self.bandwidth is not None:
             positive(f"sensors.{self.name}.bandwidth_hz", self.bandwidth, "Hz")
         if self.mount_resonance is not None:
@@ -167,7 +183,7 @@ class Recording(Drawn):
     notes: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
-        positive("sampling_rate_hz", self.rate, "Hz")
+        RATE.checked("sampling_rate_hz", self.rate)
         if isinstance(self.samples, np.ndarray):
             object.__setattr__(self, "samples", frozen(self.samples))
         if self.samples.ndim != 2 or self.samples.shape[1] != len(self.sensors):

@@ -10,6 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.frf import coherence, h1, h2, hv
 from rcsa_ident.units import to_hz
@@ -87,6 +88,8 @@ class TapFrf(Drawn):
         decays so much faster.
     axis : str
         Machine axis of hammer and response, X or Y.
+    remarks : tuple of Remark
+        What was assumed of the recordings: units, channels.
 
     Examples
     --------
@@ -105,10 +108,11 @@ class TapFrf(Drawn):
     hits: tuple[Hit, ...]
     window_decay: float = 0.0
     axis: str = "X"
+    remarks: tuple[Remark, ...] = ()
 
     def __str__(self) -> str:
         band = f"{to_hz(float(self.omega[0])):.0f} to {to_hz(float(self.omega[-1])):.0f} Hz"
-        return f"receptance {self.axis} from {self.used} of {len(self.hits)} hits, {band}"
+        return "; ".join([f"receptance {self.axis} from {self.used} of {len(self.hits)} hits, {band}", *self.remarks])
 
     @property
     def used(self) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.plausibility import RATE
 from rcsa_ident.remarks import Remark, RemarkCode
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.channel_scan import scan
@@ -64,6 +65,25 @@ class RecordCode(RemarkCode):
     ASSUMED = "assumed"
 
 
+def assumed(what: str, unit: str, meant: str) -> Remark:
+    """Return the remark on a unit that a file does not state, or states as one that is unknown.
+
+    Parameters
+    ----------
+    what, unit : str
+        A channel, a column or a file, and its unit, empty where the file states none.
+    meant : str
+        The quantity with its unit that is assumed.
+
+    Examples
+    --------
+    >>> print(assumed("column 2", "", "acceleration [m/s²]"))
+    column 2 has no unit: acceleration [m/s²] is assumed
+    """
+    stated = f"has the unit {unit}, which does not say what is measured" if unit else "has no unit"
+    return Remark(RecordCode.ASSUMED, f"{what} {stated}: {meant} is assumed")
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Verdict(Shown):
     """What was found in a record.
@@ -92,7 +112,8 @@ def examined(recording: Recording) -> Verdict:
     """Return what the samples themselves say, in one pass over them: why they are left out (lost, frozen, saturated, silent), and what
     speaks for a wrong unit or sensitivity: motion that no spindle makes, or that no sensor resolves."""
     columns = [i for i, sensor in enumerate(recording.sensors) if sensor.quantity in PLAUSIBLE]
-    reasons, notes = [], [*recording.notes]
+    unusual = RATE.remark("sampling_rate_hz", recording.rate)
+    reasons, notes = [], [*recording.notes, *([] if unusual is None else [unusual])]
     for i, found in zip(columns, scan(recording, columns), strict=True):
         sensor = recording.sensors[i]
         if found.lost:

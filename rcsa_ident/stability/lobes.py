@@ -15,7 +15,9 @@ from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import CUTTING_SPEED, SEARCHED_DEPTH, SPINDLE_SPEED, remarks_of
+from rcsa_ident.remarks import Remark
 from rcsa_ident.stability.axial_doubt import axial_doubt
 from rcsa_ident.stability.drawn_modes import drawn_tips, of_draw
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
@@ -23,6 +25,7 @@ from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes, fitted_modes, known_modes, receptance_of
 from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.units import to_rpm
 
 _ZERO_ORDER = ZeroOrder()
 #: Machines drawn from what the records leave open, each with cutting coefficients of its own.
@@ -31,6 +34,8 @@ DRAWS = 60
 DEEPER = 5.0
 #: Between speeds at which drawn machines are asked by their own period maps, as a share.
 APART = 0.015
+#: Longest estimated time that one limit may take [s].
+LONGEST_LIMIT = 3600.0
 
 
 def stability_lobes(
@@ -85,10 +90,24 @@ def stability_lobes(
     13650 rev/min: stability limit 2.48 mm, recommended 1.23 mm
     9100 rev/min: stability limit 1.66 mm, recommended 0.88 mm
     """
-    speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
-    if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):
-        raise InputError("speeds", speeds.tolist(), "one or more finite spindle speeds above 0 [rad/s]")
-    max_depth = positive("max_depth", max_depth, "m")
+    unusual = unusual_speeds(process, asked_speeds(speeds)) + list(tip.remarks if isinstance(tip, TipModes) else ())
+    found = limits_of(tip, process, speeds, max_depth, method, draws, seed)
+    return replace(found, warnings=(*found.warnings, *unusual))
+
+
+def limits_of(
+    tip: Receptance | TipModes,
+    process: MillingProcess,
+    speeds: FloatArray,
+    max_depth: float,
+    method: StabilityMethod = _ZERO_ORDER,
+    draws: int = DRAWS,
+    seed: int = 1,
+) -> StabilityLobes:
+    """Return what `stability_lobes` does, without a word on what is unusual about its speeds and modes: whoever pads speeds says it."""
+    speeds = asked_speeds(speeds)
+    max_depth = SEARCHED_DEPTH.checked("max_depth", max_depth)
+    _affordable(method, tip, process, speeds, max_depth)
     within = process.within_reach(max_depth)
     # an engagement that the cutter cannot have is said before anything is computed
     widest(process.engagement, process.cutter.outline, within)
@@ -97,6 +116,37 @@ def stability_lobes(
     found = _limits(tip, process, speeds, within, method, draws, seed)
     # the smallest limit is the depth beside which a corner radius is seen
     return replace(found, warnings=(*found.warnings, *ends, *process.cutter.cylinder_remarks(float(found.nominal.min()))))
+
+
+def asked_speeds(speeds: FloatArray) -> FloatArray:
+    """Return spindle speeds that are possible, in their order, shape (n,) [rad/s]; the lowest and the highest are looked at."""
+    speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
+    if speeds.ndim != 1 or speeds.size == 0:
+        raise InputError("speeds", speeds.tolist(), "one or more spindle speeds [rad/s]")
+    for end in (speeds.min(), speeds.max()):
+        SPINDLE_SPEED.checked("speeds", float(end))
+    return speeds
+
+
+def _affordable(method: StabilityMethod, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> None:
+    """Refuse a speed that is so low that its limit takes hours and all memory: both grow as it falls."""
+    top = float(np.abs(tip.pole).max()) if isinstance(tip, TipModes) else float(tip.omega[-1])
+    seconds = method.seconds_per_operation * method.operations(process, speeds, top, max_depth)
+    slow = int(np.argmax(seconds))
+    if seconds[slow] > LONGEST_LIMIT:
+        faster = speeds[seconds <= LONGEST_LIMIT]
+        lowest = f"{to_rpm(float(faster.min())):.0f} rev/min or more" if faster.size else "higher speeds"
+        found = f"{to_rpm(float(speeds[slow])):.3g} rev/min, whose limit by {method.name} takes about {seconds[slow] / 3600.0:.2g} h"
+        allowed = f"{lowest}, another method or a smaller depth: at most {LONGEST_LIMIT / 60.0:.0f} min for one limit"
+        raise InputError("speeds", found, allowed)
+
+
+def unusual_speeds(process: MillingProcess, speeds: FloatArray) -> list[Remark]:
+    """Return what is unusual about spindle speeds [rad/s], as a wrong unit would make it."""
+    ends = dict.fromkeys((float(speeds.min()), float(speeds.max())))
+    found = remarks_of(("spindle speed", SPINDLE_SPEED, end) for end in ends)
+    slowest = min(ends) * process.cutter.outline.largest_radius
+    return [*found, *remarks_of([("cutting speed of the lowest spindle speed", CUTTING_SPEED, slowest)])]
 
 
 def _limits(

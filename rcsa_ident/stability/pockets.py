@@ -9,7 +9,10 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import to_rpm
 
+#: Speeds with those beside them, at most: limits, and those of drawn machines, take memory for each.
+MOST_SPEEDS = 100_000
 #: Two peaks are one pocket unless the level between them falls below this share of the higher one.
 POCKET = 0.85
 #: Levels that differ by less than this share are one.
@@ -128,6 +131,10 @@ def pad_speeds(speeds: FloatArray, tolerance: float, also: Sequence[float] = ())
     step = float(np.min(np.diff(speeds), initial=0.02 * speeds[0] if speeds.size < 2 else np.inf))
     inner = np.concatenate([speeds, np.asarray(also, dtype=float)])
     low, high = inner.min() * (1.0 - tolerance), inner.max() * (1.0 + tolerance)
+    count = inner.size + max(speeds[0] - low, 0.0) / step + max(high - speeds[-1], 0.0) / step
+    if count > MOST_SPEEDS:
+        found = f"{count:.3g} speeds, with those in steps of {to_rpm(step):.3g} rev/min up to a planned cut's"
+        raise InputError("speeds", found, f"at most {MOST_SPEEDS}: wider steps, or planned cuts within the range of speeds")
     below = np.arange(speeds[0] - step, low - step, -step) if low < speeds[0] else np.zeros(0)
     above = np.arange(speeds[-1] + step, high + step, step) if high > speeds[-1] else np.zeros(0)
     # a coarse step leads far out, down to a standstill: where it does, the tolerance's own end will do

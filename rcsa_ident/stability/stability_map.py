@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import AXIAL_DEPTH
 from rcsa_ident.shown import Drawn
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.lobes import asked_speeds
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import ROUGH, Growth, longest_step
 from rcsa_ident.stability.tip_modes import TipModes
@@ -163,6 +165,9 @@ def stability_map(
     full-discretisation, 17 x 20 cuts, 8000 to 16000 rev/min up to 2 mm: 43 % stable
     """
     speeds, depths = (_ascending(name, values) for name, values in (("speeds", speeds), ("depths", depths)))
+    asked_speeds(speeds)
+    for end in depths[[0, -1]].tolist():
+        AXIAL_DEPTH.checked("depths", end)
     chosen: MonodromyMethod = FullDiscretisation() if method is None else method
     cut = chosen.monodromy(tip, process)
     step = longest_step(cut)

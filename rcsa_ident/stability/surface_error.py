@@ -15,8 +15,10 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.segments import Arc
 from rcsa_ident.cutting.teeth import edges_at, lags
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import AXIAL_DEPTH
 from rcsa_ident.shown import Drawn
+from rcsa_ident.stability.lobes import asked_speeds
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.units import to_rpm
 
@@ -132,13 +134,13 @@ def surface_location_error(
     """
     if process.feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: the force grows with it")
-    depth = positive("depth", depth, "m")
+    depth = AXIAL_DEPTH.checked("depth", depth)
     if heights < 1:
         raise InputError("heights", heights, "1 or more")
     cutter = process.cutter
     height = np.linspace(_wall_begins(cutter, depth), depth, heights)
     side = _wall(_at_the_wall(process, float(height[-1])), wall)
-    speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
+    speeds = asked_speeds(speeds)
     # angle of tooth 1 when tooth j makes the wall at a height, shape (teeth, heights)
     angle = (np.pi if side is Wall.EXIT else 0.0) - cutter.tooth_angle[:, None] + lags(cutter, height)
     offset = edges_at(cutter, height, np.full(height.shape, 0.5 * np.pi)).offset

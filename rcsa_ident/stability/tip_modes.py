@@ -17,6 +17,8 @@ from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import TIP_DAMPING, TIP_FREQUENCY, TIP_STIFFNESS, remarks_of
+from rcsa_ident.remarks import Remark
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
@@ -121,7 +123,20 @@ class TipModes(PoleResidue):
             parts.append(model.pole_residue().projected(turn, turn.T))
         if not parts:
             raise InputError("tip modes", "none", "at least one flexible direction")
-        return cls.joined(parts)
+        found = cls.joined(parts)
+        _ = found.remarks  # impossible ones are refused
+        return found
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about the modes, as a wrong unit would make it: the highest frequency, damping ratios, the softest stiffness."""
+        frequency, damping = np.abs(self.pole), -self.pole.real / np.abs(self.pole)
+        compliance = np.linalg.norm(2.0 * np.real(-self.outputs * self.inputs.T / self.pole), axis=0)
+        values = [("highest natural frequency of the tip", TIP_FREQUENCY, float(frequency.max()))]
+        values += [("damping ratio", TIP_DAMPING, float(end)) for end in np.unique(damping)[[0, -1]]]
+        if compliance.any():
+            values.append(("stiffness of the tip's softest mode", TIP_STIFFNESS, 1.0 / float(compliance.max())))
+        return tuple(dict.fromkeys(remarks_of(values)))
 
     @property
     def directions(self) -> int:

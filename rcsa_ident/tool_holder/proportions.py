@@ -7,16 +7,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import (
     CONTACT,
+    CONTACT_FREQUENCY,
+    CONTACT_LOSS,
     DENSITY,
-    DIAMETER,
-    HELIX,
     LOSS_FACTOR,
     MODULUS,
     SEGMENT_DIAMETER,
+    SEGMENT_LENGTH,
     STICKOUT,
-    TEETH,
     PlausibilityCode,
     Range,
     proportion,
@@ -31,6 +32,8 @@ from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 _CUTTER, _SLENDER = ((0.7, 2.2), (0.1, 8.0)), ((0.2, 15.0), (0.02, 100.0))
 _COOLANT, _WALL = ((0.0, 0.6), (0.0, 0.95)), ((0.0, 0.9), (0.0, 0.99))
 _FIT = ((0.98, 1.15), (0.8, 2.5))
+#: The insertion over the tool's diameter there.
+_HELD = ((0.4, 15.0), (0.04, 100.0))
 #: Share of the cutter's diameter below which a segment is a fluted one.
 _FLUTED = 0.95
 
@@ -69,15 +72,8 @@ def _flutes(assembly: ToolAssembly, cutter: Cutter) -> float:
     return length
 
 
-def cutter_values(cutter: Cutter) -> Iterator[tuple[str, Range, float]]:
-    """Yield what is asked of a cutter by itself: its key, the range, the value."""
-    yield "cutter.teeth", TEETH, cutter.teeth
-    yield "cutter.diameter_mm", DIAMETER, cutter.diameter
-    yield "cutter.helix_deg", HELIX, float(cutter.helices.max())
-
-
 def _values(assembly: ToolAssembly, cutter: Cutter) -> Iterator[tuple[str, Range, float]]:
-    yield from cutter_values(cutter)
+    yield from cutter.values
     yield "tool.stickout_mm", STICKOUT, assembly.stickout
     for body, segments in (("tool", assembly.tool), ("holder", assembly.holder)):
         for i, segment in enumerate(segments):
@@ -85,6 +81,7 @@ def _values(assembly: ToolAssembly, cutter: Cutter) -> Iterator[tuple[str, Range
             yield f"{place}.material: youngs_modulus_gpa", MODULUS, segment.material.youngs_modulus
             yield f"{place}.material: density", DENSITY, segment.material.density
             yield f"{place}.material: loss_factor", LOSS_FACTOR, segment.material.loss_factor
+            yield f"{place}.length_mm", SEGMENT_LENGTH, segment.length
             yield f"{place}.outer_diameter_mm", SEGMENT_DIAMETER, segment.diameter
             if segment.end_diameter is not None:
                 yield f"{place}.end_diameter_mm", SEGMENT_DIAMETER, segment.end_diameter
@@ -106,6 +103,7 @@ def _shapes(assembly: ToolAssembly, cutter: Cutter) -> Iterator[Remark | None]:
             words = f"{_mm(segment.inner_diameter)} in an outer diameter of {_mm(outer)}"
             wanted = f"a bore of at most {limits[0][1]:g} times the outer diameter (a wall of {_mm(0.5 * (1.0 - limits[0][1]) * outer)})"
             yield proportion(f"{body}.segments[{i}].inner_diameter_mm", segment.inner_diameter / outer, *limits, words, wanted)
+    yield from _held(assembly)
     yield from _fits(assembly)
     flutes = _flutes(assembly, cutter)
     if flutes > assembly.stickout + 1e-6:
@@ -113,6 +111,27 @@ def _shapes(assembly: ToolAssembly, cutter: Cutter) -> Iterator[Remark | None]:
             f"tool.stickout_mm is {_mm(assembly.stickout)}, but the tool's fluted part is {_mm(flutes)} long: it is clamped in the holder"
         )
         yield Remark(PlausibilityCode.PROPORTION, words)
+
+
+def _held(assembly: ToolAssembly) -> Iterator[Remark | None]:
+    """How far the tool is in the holder, and what the contact damps there."""
+    contact, depth, thick = assembly.contact, assembly.insertion, assembly.tool[-1].end
+    if depth == 0.0:
+        if contact is not None:
+            allowed = "a length above 0 [mm]: the contact holds the tool per metre of it; of one piece, tool and holder have no [contact]"
+            raise InputError("holder.insertion_mm", "0 mm beside a [contact]", allowed)
+        return
+    words, wanted = f"{_mm(depth)} of a tool that is {_mm(thick)} thick there", _times(_HELD[0], "its diameter")
+    yield proportion("holder.insertion_mm", depth / thick, *_HELD, words, wanted)
+    for kind, limits in CONTACT_LOSS.items():
+        stiffness, damping = (0.0 if contact is None else getattr(contact, f"{kind}_{name}") for name in ("stiffness", "damping"))
+        if stiffness == 0.0:
+            continue
+        loss = damping * CONTACT_FREQUENCY / stiffness
+        words = f"{damping:.4g} beside a stiffness of {stiffness:.4g}, a loss factor of {loss:.2g} at 1000 Hz"
+        softer = CONTACT[f"{kind}_stiffness"].remark(f"contact.{kind}_stiffness", stiffness)
+        wanted = "; ".join([f"a loss factor of at most {limits[0][1]:g}", *([] if softer is None else [softer])])
+        yield proportion(f"contact.{kind}_damping", loss, *limits, words, wanted)
 
 
 def _fits(assembly: ToolAssembly) -> Iterator[Remark | None]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.remarks import Remark
 
 #: Feed of a rapid move: as fast as the machine goes.
 RAPID = np.inf
@@ -34,6 +35,8 @@ class ToolPath:
         Number of the tool in its magazine.
     line : array of int, shape (k,), default 0
         Of the file that the move stands in; several share one where an arc was cut up.
+    remarks : tuple of Remark
+        What its file does not state and was assumed.
 
     Examples
     --------
@@ -50,6 +53,7 @@ class ToolPath:
     speed: FloatArray = field(default=None)  # type: ignore[arg-type]
     tool: np.ndarray = field(default=None)  # type: ignore[arg-type]
     line: np.ndarray = field(default=None)  # type: ignore[arg-type]
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         places = frozen(self.places)

@@ -13,6 +13,7 @@ from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import BareCutter
+from rcsa_ident.plausibility import AXIAL_DEPTH, SPINDLE_SPEED
 from rcsa_ident.stability.advice import (
     Advice,
     Bound,
@@ -83,9 +84,14 @@ def advise(
         Cuts that were tried: how many do the limits tell right?
     """
     process, shares, asked = change.process, _Shares(tolerance, probability, reserve), change
+    for name, deep in (("max_depth", change.max_depth), *([] if depth is None else [("depth", depth)])):
+        AXIAL_DEPTH.checked(name, deep)
+    for i, (speed, at) in enumerate(planned):
+        SPINDLE_SPEED.checked(f"planned[{i}] spindle speed", speed)
+        AXIAL_DEPTH.checked(f"planned[{i}] axial depth", at)
     if depth is not None and 0.0 <= reserve < 1.0:
         # twice as deep as tells whether this depth may be cut: straight lines to the limits beside it show where its windows end
-        change = replace(change, max_depth=max(change.max_depth, 2.0 * depth / (1.0 - reserve)))
+        change = replace(change, max_depth=min(max(change.max_depth, 2.0 * depth / (1.0 - reserve)), AXIAL_DEPTH.most))
     wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
     low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
 
@@ -112,7 +118,7 @@ def advise(
         () if depth is None else tuple(speed_windows(usable, depth)),
         tuple(planned_cut(wide, process, drive, speed, at, tolerance, probability, judged.get(speed)) for speed, at in planned),
         None if tested is None else classify_tested_cuts(change, tested),
-        tuple(dict.fromkeys([*change.remarks(lobes), *found.remarks])),
+        tuple(dict.fromkeys([*change.remarks(lobes), *drive.remarks, *found.remarks])),
         found.pockets,
         found.by,
         None if best is None else _band_of(asked, best.spindle_speed, tolerance),

@@ -15,6 +15,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.line_noise import differences_noise, line_noise
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.remarks import Remark
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 
@@ -66,6 +67,8 @@ class TapTest:
         Of the real and of the imaginary part each; None finds it from neighbouring frequencies.
     band : (float, float) or None [rad/s]
         What is used; None is all.
+    remarks : tuple of Remark
+        What the file does not state and was assumed.
     """
 
     name: str
@@ -77,6 +80,7 @@ class TapTest:
     col: str = "tip"
     std: FloatArray | None = None
     band: tuple[float, float] | None = None
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         omega, values = frozen(self.omega), frozen(self.values, np.complex128)
@@ -186,7 +190,8 @@ def calibrate_contact(
         theta, _ = problem.solve(theta, 20, 1e-5)
         if progress is not None:
             progress(_TRIED + k + 1, _TRIED + 3)
-    return _answer(problem, theta)
+    answer = _answer(problem, theta)
+    return replace(answer, notes=(*answer.notes, *dict.fromkeys(remark for tap in taps for remark in tap.remarks)))
 
 
 def tap_model(tap: TapTest, contact: Contact, modulus: float = 1.0) -> ComplexArray:

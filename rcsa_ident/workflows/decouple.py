@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.responses import in_plane
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.remarks import Remark
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.rods import rod_poles
@@ -39,6 +40,8 @@ class FlangeTap:
         All but the bare flange.
     omega : array, shape (n,) [rad/s]
     values : complex array, shape (n,) [m/N]
+    remarks : tuple of Remark
+        What the file does not state and was assumed.
     """
 
     name: str
@@ -46,6 +49,7 @@ class FlangeTap:
     place: Place
     omega: FloatArray
     values: ComplexArray
+    remarks: tuple[Remark, ...] = ()
 
 
 def flange_from_taps(
@@ -84,7 +88,8 @@ def flange_from_taps(
         holder = in_plane(planes[key], axis)
         std = np.hypot(neighbour_noise(tap.values), model_share * np.abs(tap.values))
         observations.append(Observation(holder, *_ENDS[tap.place], tap.values, std))
-    return least_squares_flange(observations, joint, least_damping)
+    found = least_squares_flange(observations, joint, least_damping)
+    return replace(found, notes=(*found.notes, *dict.fromkeys(remark for tap in taps for remark in tap.remarks)))
 
 
 def axial_flange_from_tap(tooling: Tooling, omega: FloatArray, values: ComplexArray, model_share: float = MODEL_SHARE) -> AxialFlange:

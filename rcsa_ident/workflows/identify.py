@@ -11,7 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.corner import corner_change, has_corner
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.receptance import Receptance, assumed_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.cut_data import prepare
 from rcsa_ident.identification.data import IdentificationData
@@ -113,12 +113,13 @@ def hammer_lines(campaign: Campaign, read: ReadTest) -> tuple[HammerLines, ...]:
     InputError
         If a file does not hold the FRF, or the FRF no line within the test's band.
     """
-    return tuple(_lines_of(test, *read(test)) for test in campaign.tests)
+    return tuple(_lines_of(test, read(test)) for test in campaign.tests)
 
 
-def _lines_of(test: HammerTest, frequency: FloatArray, value: ComplexArray) -> HammerLines:
+def _lines_of(test: HammerTest, curve: tuple[FloatArray, ComplexArray]) -> HammerLines:
     """The lines of a test that are kept, with the noise that its curve shows and the share that it may be wrong by."""
     low, high = test.band
+    frequency, value = curve
     # at 0 Hz a receptance from acceleration is not one, and nothing has a direction
     used = (frequency >= low) & (frequency <= high) & (frequency > 0.0) & (value != 0.0)
     if np.sum(used) < FEWEST_LINES:
@@ -138,6 +139,7 @@ def _lines_of(test: HammerTest, frequency: FloatArray, value: ComplexArray) -> H
         test.force,
         test.sensor_mass,
         test.standstill,
+        assumed_of([curve]),
     )
 
 
@@ -175,7 +177,8 @@ def identify(
     _at_one_posture(campaign)
     found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings)
     clock = clock_remark(readings)
-    return found if clock is None else replace(found, notes=(*found.notes, clock))
+    said = tuple(dict.fromkeys([*(remark for test in tests for remark in test.remarks), *([] if clock is None else [clock])]))
+    return replace(found, notes=(*found.notes, *said)) if said else found
 
 
 def _at_one_posture(campaign: Campaign) -> None:

@@ -157,7 +157,8 @@ def learn_toolings(
     if data.sweeps:
         raise InputError("cuts", "passes whose speed changes", "cuts at a speed that is kept")
     fit = fit_further(data, known, max(campaign.toolings[name].spread.spindle_joint for name in used))
-    notes = [*_speed_notes(known, data.spindle_speed[: data.cuts].tolist())]
+    assumed = dict.fromkeys(remark for test in tests for remark in test.remarks)
+    notes = [*assumed, *_speed_notes(known, data.spindle_speed[: data.cuts].tolist())]
     missing = fit.contradicting()
     notes += [f"{name}: contradicts the cuts and counts as little as it explains" for name in missing if name in data.cut_ids[data.cuts :]]
     out = [name for name in missing if name in data.cut_ids[: data.cuts]]

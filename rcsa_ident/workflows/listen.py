@@ -9,6 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import RATE, SPINDLE_SPEED, TEETH
 from rcsa_ident.signals.channel_scan import ChannelScan, scan
 from rcsa_ident.signals.listening import Event, Listening, Record, listen
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording, Sensor
@@ -52,6 +53,12 @@ def listen_to(
     >>> print(answer, answer.teeth)
     stable at 6000.0 rev/min 4
     """
+    RATE.checked("sampling_rate_hz", rate)
+    for field, speed in (("speed", spindle_speed), *(("speeds", end) for end in between or ())):
+        if speed is not None:
+            SPINDLE_SPEED.checked(field, speed)
+    if teeth is not None:
+        TEETH.checked("teeth", teeth)
     # channel after channel in memory: most of what follows goes along one of them
     whole = np.stack([np.asarray(channel, dtype=float) for channel in channels]).T
     spare = max(whole.shape[0] - MOST, 0) // 2

@@ -166,7 +166,7 @@ def remove_along(
     removed = before - field.volume
     seconds = time.perf_counter() - start
     warnings += [*_rapid(fine, engagement), *guard.warnings, *_odd_outcome(removed, before, warnings)]
-    return PathRemoval(fine, engagement, engagement.volumes(solid), field, removed, sweep.updates, seconds, tuple(warnings))
+    return PathRemoval(fine, engagement, engagement.volumes(solid), field, removed, sweep.updates, seconds, (*path.remarks, *warnings))
 
 
 def _misplaced(solid: ToolSolid, path: ToolPath, low: FloatArray, high: FloatArray) -> list[str]:

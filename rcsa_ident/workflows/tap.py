@@ -10,8 +10,11 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.plausibility import RATE, SENSOR_MASS
+from rcsa_ident.remarks import Remark
+from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.tap import HitEstimator, TapFrf, tap
+from rcsa_ident.signals.verdict import RecordCode, assumed
 
 #: How many times as long as the hammer's pulses the other channels go on.
 _LONGER = 3.0
@@ -19,6 +22,7 @@ _LONGER = 3.0
 _SAME_RATE = 1e-4
 #: How often a response is differentiated, by the words of commands and queries, and by what a channel's unit says.
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+_UNITS = ("m", "m/s", "m/s²")
 _OF_UNIT = {Quantity.DISPLACEMENT: 0, Quantity.ACCELERATION: 2}
 
 
@@ -28,20 +32,22 @@ class Channel(Protocol):
     @property
     def name(self) -> str: ...
     @property
+    def unit(self) -> str: ...
+    @property
     def quantity(self) -> Quantity | None: ...
     @property
     def samples(self) -> FloatArray: ...
 
 
 class Opened(Protocol):
-    """A recording as a file tells it: rate [Hz], channels, and what was guessed."""
+    """A recording as a file tells it: rate [Hz], channels, and what was assumed."""
 
     @property
     def rate(self) -> float: ...
     @property
     def channels(self) -> Sequence[Channel]: ...
     @property
-    def remarks(self) -> Sequence[str]: ...
+    def remarks(self) -> Sequence[Remark]: ...
 
 
 def tap_recordings(
@@ -52,8 +58,8 @@ def tap_recordings(
     estimator: HitEstimator = HitEstimator.H1,
     sensor_mass: float = 0.0,
     axis: str = "X",
-) -> tuple[TapFrf, list[str]]:
-    """Return the receptance that recordings of hits give together, and what was taken as given, in sentences.
+) -> TapFrf:
+    """Return the receptance that recordings of hits give together; its remarks say what was assumed.
 
     Parameters
     ----------
@@ -73,23 +79,27 @@ def tap_recordings(
     InputError
         A channel is not told, the recordings have several rates, or no hit can be used.
     """
+    SENSOR_MASS.checked("sensor_mass", sensor_mass)
     if quantity not in DERIVATIVES:
         raise InputError("quantity", quantity, ", ".join(DERIVATIVES))
-    derivative, pairs, said = DERIVATIVES[quantity], [], []
+    derivative, pairs, said = DERIVATIVES[quantity], [], list[Remark]()
     for recording in recordings:
         hammer, moved, remarks = _pair(recording, force, response)
         pairs.append((hammer.samples, moved.samples))
         derivative = derivative if moved.quantity is None else _OF_UNIT.get(moved.quantity, derivative)
+        if moved.quantity not in _OF_UNIT:
+            remarks.append(assumed(moved.name, moved.unit, f"{quantity} [{_UNITS[DERIVATIVES[quantity]]}]"))
         said += [remark for remark in (*recording.remarks, *remarks) if remark not in said]
     rates = sorted(recording.rate for recording in recordings)
     if not rates or rates[-1] > (1.0 + _SAME_RATE) * rates[0]:
         raise InputError("sampling_rate_hz", ", ".join(f"{rate:g}" for rate in rates) or "no recording", "one rate for all recordings [Hz]")
-    return replace(tap(rates[0], pairs, derivative, estimator, sensor_mass), axis=axis), said
+    said += [each for each in (RATE.remark("sampling_rate_hz", RATE.checked("sampling_rate_hz", rates[0])),) if each is not None]
+    return replace(tap(rates[0], pairs, derivative, estimator, sensor_mass), axis=axis, remarks=tuple(said))
 
 
-def _pair(recording: Opened, force: str | None, response: str | None) -> tuple[Channel, Channel, list[str]]:
-    """The hammer's channel, the response's, and what was guessed."""
-    channels, said = recording.channels, []
+def _pair(recording: Opened, force: str | None, response: str | None) -> tuple[Channel, Channel, list[Remark]]:
+    """The hammer's channel, the response's, and what was assumed."""
+    channels, said = recording.channels, list[Remark]()
     forces = [i for i, each in enumerate(channels) if each.quantity is Quantity.FORCE]
     if force is not None:
         hammer = _named("force", force, channels)
@@ -97,7 +107,9 @@ def _pair(recording: Opened, force: str | None, response: str | None) -> tuple[C
         hammer = forces[0]
     else:
         hammer = hammer_channel([each.samples for each in channels])
-        said.append(f"{channels[hammer].name}, which comes in pulses, was taken as the hammer's force [N]")
+        said.append(Remark(RecordCode.ASSUMED, f"{channels[hammer].name}, which comes in pulses, was taken as the hammer's force"))
+    if channels[hammer].quantity is not Quantity.FORCE:
+        said.append(assumed(channels[hammer].name, channels[hammer].unit, f"force [{SI_UNITS[Quantity.FORCE]}]"))
     others = [i for i in range(len(channels)) if i != hammer]
     if response is None and len(others) != 1:
         raise InputError("response", ", ".join(channels[i].name for i in others) or "none", "the name of one channel")

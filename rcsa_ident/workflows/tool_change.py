@@ -21,7 +21,17 @@ from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.label_noise import LabelNoise
-from rcsa_ident.stability.lobes import APART, DRAWS, asked_directions, both_directions, directions_for, own_drawn_limits, stability_lobes
+from rcsa_ident.stability.lobes import (
+    APART,
+    DRAWS,
+    asked_directions,
+    asked_speeds,
+    both_directions,
+    directions_for,
+    limits_of,
+    own_drawn_limits,
+    unusual_speeds,
+)
 from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.pockets import pad_speeds
@@ -34,6 +44,7 @@ from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.proportions import edge_length
 from rcsa_ident.units import from_hz, to_hz, to_rpm
+from rcsa_ident.workflows.outside import outside_band, outside_speeds
 
 #: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.
 BEYOND = 1.5
@@ -93,12 +104,14 @@ def tooltip(
     relative : bool
         Relative to the workpiece, as limits are computed from; by default the tool's own.
     """
+    if speed is not None:
+        SPINDLE_SPEED.checked("speed", speed)
     here = machine.at(speed)
     tip = (here.relative_tip if relative else here.tip)(tooling, omega, spread, stiffness_spread, here.translations)
     if isinstance(tip, TipModes):
         lines = tip.receptance().omega if omega is None else omega
         tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
-    remarks = [*tooling.remarks, *machine.remarks, *([] if speed is None else _outside(machine, np.array([speed])))]
+    remarks = [*tooling.remarks, *machine.remarks, *([] if speed is None else outside_speeds(machine, np.array([speed])))]
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
         top = to_hz(machine.band[1])
         remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
@@ -152,6 +165,13 @@ class ToolChange:
     draws: int = DRAWS
     stiffness_spread: float = STIFFNESS_SPREAD
     recommend: bool = True
+
+    def __post_init__(self) -> None:
+        if np.size(self.speeds):  # a path brings its own
+            asked_speeds(self.speeds)
+        SEARCHED_DEPTH.checked("max_depth", self.max_depth)
+        if not 0.0 <= self.stiffness_spread <= 0.5:
+            raise InputError("stiffness_spread", self.stiffness_spread, "a share from 0 to 0.5")
 
     @property
     def process(self) -> MillingProcess:
@@ -209,7 +229,7 @@ class ToolChange:
             return self.machine.limits(process, speeds, depth, draws)
         for places, tip in self.tips(speeds, self.omega, draws > 0):
             order.append(places)
-            parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
+            parts.append(limits_of(tip, process, speeds[places], depth, self.method, draws))
         return StabilityLobes.joined(parts, order)
 
     def fitting_limits(self, speeds: FloatArray, draws: int | None = None) -> Fitting:
@@ -232,14 +252,15 @@ class ToolChange:
     def remarks(self, lobes: StabilityLobes) -> tuple[str, ...]:
         """Return what speaks against limits."""
         band = self.machine.band
-        outside = None if band is None else _outside_band(lobes, band)
+        outside = None if band is None else outside_band(lobes, band)
         said = [
             *self.tooling.remarks,
             *self.machine.remarks,
             *lobes.warnings,
             *self._beyond(lobes),
             *([outside] if outside else []),
-            *_outside(self.machine, self.speeds),
+            *outside_speeds(self.machine, self.speeds),
+            *unusual_speeds(self.process, self.speeds),
         ]
         return tuple(dict.fromkeys(said))
 
@@ -362,29 +383,3 @@ def _lowest_real_part(tip: Receptance) -> tuple[float, float]:
     least = np.einsum("nii->ni", tip.values).real.min(axis=1)
     worst = int(np.argmin(least))
     return float(tip.omega[worst]), float(least[worst])
-
-
-def _outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:
-    """A sentence where the limiting vibration lies outside the band in which the machine is known, else None."""
-    low, high = (to_hz(w) for w in band)
-    frequency = to_hz(lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)])
-    outside = (frequency < low) | (frequency > high)
-    if not outside.any():
-        return None
-    worst = float(frequency[outside][np.argmax(np.abs(frequency[outside] - 0.5 * (low + high)))])
-    return (
-        f"at {int(outside.sum())} of {lobes.spindle_speed.size} speeds chatter is expected outside the identified band "
-        f"{low:.0f}-{high:.0f} Hz (as far as {worst:.0f} Hz): the machine is extrapolated there"
-    )
-
-
-def _outside(machine: TipSource, speeds: FloatArray) -> list[str]:
-    """A sentence where a machine that changes with speed is asked for speeds that it was not cut at."""
-    known = machine.speed_range
-    # the last digit of a speed that was written in rev/min is nobody's wish
-    if known is None or (speeds.min() >= known[0] * (1.0 - 1e-9) and speeds.max() <= known[1] * (1.0 + 1e-9)):
-        return []
-    low, high = (to_rpm(speed) for speed in known)
-    return [
-        f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside this range its dynamics at the nearest speed are used"
-    ]

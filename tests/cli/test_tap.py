@@ -34,6 +34,7 @@ def test_an_frf_that_is_read_again(recorded, tmp_path, suffix):
     answer = json.loads(found.stdout)
     assert (answer["used"], len(answer["hits"])) == (2, 2)
     assert any("column 2" in remark for remark in answer["remarks"])
+    assert "column 3 has no unit: acceleration [m/s²] is assumed" in answer["remarks"]
     (test,) = read_frfs(out)
     inside = (test.frequency > 300.0) & (test.frequency < 3000.0)
     true = receptance(2.0 * np.pi * test.frequency[inside])
@@ -44,6 +45,7 @@ def test_a_figure_and_words_for_people(recorded, tmp_path):
     found = run("tap", recorded, "--out", tmp_path / "tip.csv", "--plot", tmp_path / "tip.svg")
     assert found.exit_code == 0
     assert "2 of 2 hits" in found.stdout
+    assert "column 3 has no unit: acceleration [m/s²] is assumed" in found.stderr
     assert "coherence" in (tmp_path / "tip.svg").read_text(encoding="utf-8")
 
 

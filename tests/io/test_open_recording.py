@@ -59,7 +59,7 @@ def test_a_table_tells_itself(tmp_path, shape):
     lines, options = SHAPES[shape]
     opened = open_recording(written(tmp_path, lines, **options))
     assert opened.rate == pytest.approx(2000.0)
-    quantity, channels = opened.of()
+    quantity, channels, _ = opened.of()
     assert quantity is Quantity.ACCELERATION
     assert len(channels) == 2
     for channel, expected in zip(channels, (X, Y), strict=True):
@@ -80,7 +80,7 @@ def test_a_table_without_names_has_its_time_in_front(tmp_path):
     assert any("column 1" in remark for remark in opened.remarks)
     with pytest.raises(InputError, match="told: no unit"):
         opened.of()
-    quantity, channels = opened.of(Quantity.FORCE, ["column 2"])
+    quantity, channels, _ = opened.of(Quantity.FORCE, ["column 2"])
     assert quantity is Quantity.FORCE
     np.testing.assert_allclose(channels[0].samples, X, atol=1e-8)
 
@@ -130,7 +130,7 @@ def test_formats_with_named_channels_list_them(tmp_path, name):
     assert opened.rate == 2000.0
     with pytest.raises(InputError, match="no unit in the file"):
         opened.of()
-    quantity, channels = opened.of(Quantity.ACCELERATION)
+    quantity, channels, _ = opened.of(Quantity.ACCELERATION)
     assert quantity is Quantity.ACCELERATION
     assert sorted(each.name for each in channels) == ["a", "b"]
     for each in channels:
@@ -183,7 +183,7 @@ def parquet_with_units(path):
 def test_units_that_the_file_tells_choose_the_channels(tmp_path, name, write):
     path = tmp_path / name
     write(path)
-    quantity, channels = open_recording(path).of()
+    quantity, channels, _ = open_recording(path).of()
     assert quantity is Quantity.ACCELERATION
     assert len(channels) == 2
     for each, expected in zip(channels, (X, Y), strict=True):

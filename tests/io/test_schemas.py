@@ -25,6 +25,7 @@ _BETWEEN_KEYS = re.compile(
     r"materials\.\S+: found nothing|shaft's length|a number other than 0|one table \[sensors|"
     r"above from_hz|where there are cuts|at least one tooling|hammer tests \[\[frfs\]\], or both|"
     r"a point of the tool-holder, tip or mm|one or more speeds|\[\[z\]\] or several of them|"
+    r"runout_mm|a loss factor|\.engagement: found|"
     r"stickout|insertion|softening|settling|from.*to|without it the cut keeps its speed|of change in each pass|"
     r"times the value|of a value that is not given|radial_mpa|a vector of three that is not zero|then a higher one|are these millimetres"
 )

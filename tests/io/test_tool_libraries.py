@@ -133,8 +133,8 @@ def test_rounded_figures_leave_the_tool_inside_of_the_holder():
 
 @settings(max_examples=50, deadline=None)
 @given(
-    heights=st.lists(st.floats(0.01, 60.0), min_size=1, max_size=8),
-    share=st.floats(0.05, 1.0),
+    heights=st.lists(st.floats(5.0, 60.0), min_size=1, max_size=8),
+    share=st.floats(0.2, 1.0),
     scale=st.sampled_from([1.0, 25.4]),
     length=st.floats(61.0, 400.0),
 )

@@ -40,7 +40,7 @@ CUTS = {
 def heard(part: str, **told: object) -> Listening:
     (path,) = [each for each in SHARED.rglob("*") if part in each.name]
     opened = open_recording(path)
-    quantity, channels = opened.of()
+    quantity, channels, _ = opened.of()
     return listen_to(opened.rate, [each.samples for each in channels], quantity, **told)
 
 
@@ -63,7 +63,7 @@ def test_accelerometers_alone_are_cuts_of_a_campaign(part):
     """What a campaign makes of them, speed and teeth as they are told."""
     (path,) = [each for each in SHARED.rglob("*") if part in each.name]
     opened = open_recording(path)
-    _, channels = opened.of()
+    _, channels, _ = opened.of()
     axes = [Dof(next(word for word in each.name.lower().split() if word in "xyz")) for each in channels]
     chosen = [(each, axis) for each, axis in zip(channels, axes, strict=True) if axis is not Dof.Z]
     samples = np.stack([each.samples for each, _ in chosen], axis=1)

@@ -372,7 +372,7 @@ def test_bad_input(make, field, words):
         mill(12, 0.9, helix=0.5),
         mill(12, 0.01),
         MillingProcess(Cutter(2, 0.012), COEFFICIENTS, Engagement(np.radians(100.0), np.radians(101.0))),
-        MillingProcess(Cutter(4, 0.004, np.radians(60.0)), CuttingCoefficients(2e7, 0.3), HALF),
+        MillingProcess(Cutter(4, 0.004, np.radians(60.0)), CuttingCoefficients(3e7, 0.3), HALF),
         mill(2, 0.5, helix=1.3, pitch=np.radians([60.0, 300.0])),
         mill(3, 0.6, damping=ProcessDamping(1e15, 2e-4)),
         mill(2, 0.5, speed_variation=SpeedVariation(0.8, 0.1)),

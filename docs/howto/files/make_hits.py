@@ -18,4 +18,4 @@ for axis, modes in MODES.items():
         force.append(pulse + 0.05 * chance.standard_normal(samples))
         acceleration.append(np.fft.irfft(spectrum * receptance * frequency**2, samples) + 0.3 * chance.standard_normal(samples))
     table = np.column_stack([np.arange(3 * samples) / RATE, np.concatenate(force), np.concatenate(acceleration)])
-    np.savetxt(f"hits_{axis}.csv", table, fmt="%.7f,%.3f,%.3f", header="time,force,acceleration", comments="")
+    np.savetxt(f"hits_{axis}.csv", table, fmt="%.7f,%.3f,%.3f", header="time (s),force (N),acceleration (m/s^2)", comments="")

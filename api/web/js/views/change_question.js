@@ -15,13 +15,13 @@ export async function methods() {
 // knows what is possible, and says what is usual beside it
 export const NUMBERS = [
   ["im", "percent", 50, "cut.immersion", 0.1, 100, "Radial immersion"],
-  ["ya", "length", null, "cut.y_from_mm", -500, 500, "Block from"],
-  ["yb", "length", null, "cut.y_to_mm", -500, 500, "Block to"],
+  ["ya", "length", null, "cut.y_from_mm", -2000, 2000, "Block from"],
+  ["yb", "length", null, "cut.y_to_mm", -2000, 2000, "Block to"],
   ["fz", "feed", 0.1, "cut.feed_per_tooth_mm", 0, Infinity, "Feed per tooth"],
-  ["from", "speed", 4000, "speeds.from_rpm", 100, 200_000, "From"],
-  ["to", "speed", 20_000, "speeds.to_rpm", 100, 200_000, "To"],
+  ["from", "speed", 4000, "speeds.from_rpm", 10, 500_000, "From"],
+  ["to", "speed", 20_000, "speeds.to_rpm", 10, 500_000, "To"],
   ["step", "speed", 50, "speeds.step_rpm", 0.1, 100_000, "Step"],
-  ["deep", "depth", 10, "max_depth_mm", 1e-3, 500, "Deepest that is asked for"],
+  ["deep", "depth", 10, "max_depth_mm", 1e-4, 500, "Deepest that is asked for"],
   ["ktc", "pressure", null, "cut.ktc_mpa", 0, Infinity, "Tangential coefficient"],
   ["krc", "none", null, "cut.krc", -Infinity, Infinity, "Radial over tangential"],
   ["kac", "none", null, "cut.kac", -Infinity, Infinity, "Axial over tangential"],
