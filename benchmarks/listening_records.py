@@ -92,6 +92,9 @@ def draw(seed: int, seconds: float = 6.0) -> MadeUp:
     orders = {m: size / largest for m, size in orders.items() if size > 2e-3 * largest}
     # the cut's force is not quite even: its lines swing slowly
     even = 1.0 + rng.uniform(0.0, 0.3) * _slow(rng, n, rate, rng.uniform(0.1, 0.6))
+    # a drive or a belt modulates it at a frequency of its own: every order gets sidebands, at the spacing of the spindle and of the teeth
+    if rng.uniform() < 0.4:
+        even = even + _log_uniform(rng, 0.05, 0.9) * np.cos(rng.uniform(0.06, 0.5) * angle)
     forced = [even * sum(a * np.cos(m * angle + rng.uniform(0.0, 2.0 * np.pi)) for m, a in orders.items()) for _ in range(channels)]
     level = rng.uniform(0.2, 1.0, channels)
     signal = np.stack(forced, axis=1) * level
@@ -104,10 +107,9 @@ def draw(seed: int, seconds: float = 6.0) -> MadeUp:
     if rng.uniform() < 0.35:
         mains = float(rng.choice((50.0, 60.0))) * (1.0 + 1e-3 * rng.standard_normal())
         size, kind = _log_uniform(rng, 0.05, 0.8), "hum"
+        falls = rng.uniform(0.3, 1.5)
         for k in range(1, 8):
-            signal += (size / k ** rng.uniform(0.3, 1.5) * level * np.cos(2.0 * np.pi * k * mains * time + rng.uniform(0.0, 6.0)))[:, None] if (
-                channels == 1
-            ) else size / k * np.outer(np.cos(2.0 * np.pi * k * mains * time + rng.uniform(0.0, 6.0)), level)
+            signal += size / k**falls * np.outer(np.cos(2.0 * np.pi * k * mains * time + rng.uniform(0.0, 6.0)), level)
     if rng.uniform() < 0.35:
         kind = "bearing" if kind == "noise alone" else f"{kind} and bearing"
         for _ in range(int(rng.integers(1, 5))):

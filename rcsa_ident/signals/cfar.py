@@ -15,8 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import gammaincc, gammaincinv
-from scipy.stats import beta
+from scipy.special import betaincinv, gammaincc, gammaincinv
 
 from rcsa_ident.arrays import FloatArray
 
@@ -24,6 +23,8 @@ from rcsa_ident.arrays import FloatArray
 REFERENCE, RANK = 32, 0.5
 #: Correlation of the powers of neighbouring bins of a Hann window, of those next to them, and of windows that overlap by half.
 _NEXT, _SECOND, _OVERLAP = 4.0 / 9.0, 1.0 / 36.0, 1.0 / 36.0
+#: Nodes and weights of the integral over the ordered cell's quantiles.
+_NODES = np.polynomial.legendre.leggauss(100)
 #: Bins whose median tells the colour of the noise.
 _BAND = 40
 
@@ -55,9 +56,9 @@ def false_alarm(scale: float, shape: float, cells: int = REFERENCE) -> float:
     True
     """
     rank = max(round(RANK * cells), 1)
-    node, weight = np.polynomial.legendre.leggauss(200)
+    node, weight = _NODES
     # the distribution of the ordered cell, over its own quantiles
-    order = beta.ppf(0.5 * (node + 1.0), rank, cells - rank + 1)
+    order = betaincinv(rank, cells - rank + 1, 0.5 * (node + 1.0))
     return float(np.sum(0.5 * weight * gammaincc(shape, scale * gammaincinv(shape, order))))
 
 

@@ -18,7 +18,7 @@ from scipy.special import gammainc, gammaln, logsumexp
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals.steady_part import hann
 
-#: Largest numerator and denominator of a candidate where no number of teeth is told, and most teeth that are thought of then.
+#: Largest part of the spindle's frequency that may have been found, and most teeth that are thought of where no number is told.
 _PARTS, _TEETH = 6, 8
 #: Revolutions of the slowest candidate in a window, and the window's usual length [s].
 _TURNS, _SECONDS = 8.0, 2.0
@@ -34,20 +34,26 @@ _ROUGH, _COMPARED = np.log(10.0), 8
 _DECADES, _MOST = 6.0, 3.0
 #: Power of the prior of the share of the lines' power that the teeth hold: density proportional to share^_CUT.
 _CUT = 3.0
+#: Logarithm of the odds that what was found is the spindle's, before the number of teeth speaks.
+_FOUND = 8.0
 #: Highest frequency over the sampling rate, and highest order of the found frequency.
 _BAND, _ORDERS = 0.4, 48
 
 
 def multiples(teeth: int | None) -> list[Fraction]:
-    """Return the factors by which a found frequency may differ from the spindle's."""
-    most = _PARTS if teeth is None else max(_PARTS, teeth)
-    return sorted({Fraction(a, b) for a in range(1, most + 1) for b in range(1, most + 1)})
+    """Return the factors by which a found frequency may differ from the spindle's.
+
+    What is found may be tooth passages, or every second of them, if the number of teeth is divided by it; or a part of the spindle's
+    frequency. Where no number is told nothing speaks against what was found.
+    """
+    if teeth is None:
+        return [Fraction(1)]
+    parts = [Fraction(1, count) for count in range(teeth, 1, -1) if teeth % count == 0]
+    return [*parts, *(Fraction(times) for times in range(1, _PARTS + 1))]
 
 
-def log_odds(
-    samples: FloatArray, rate: float, angle: FloatArray, factors: Sequence[Fraction], teeth: int | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the logarithm of each candidate's likelihood beside that of noise alone, and what it is if no line between teeth is seen.
+def log_odds(samples: FloatArray, rate: float, angle: FloatArray, factors: Sequence[Fraction], teeth: int | None) -> FloatArray:
+    """Return the logarithm of each candidate's likelihood beside that of noise alone, shape (f,).
 
     Parameters
     ----------
@@ -61,8 +67,8 @@ def log_odds(
         As told.
     """
     power, floor, step, windows = _order_spectrum(samples, rate, angle, float(min(factors)))
-    top = min(_BAND * rate * 2.0 * np.pi * (angle.size - 1) / ((angle[-1] - angle[0]) * rate), _ORDERS)
-    bins = min(power.shape[0] - _OWN - 1, int(top / step))
+    nyquist = np.pi * (angle.size - 1) / (angle[-1] - angle[0])
+    bins = min(power.shape[0] - _OWN - 1, int(min(2.0 * _BAND * nyquist, _ORDERS) / step))
     found = np.full(len(factors), -np.inf)
     for i, factor in enumerate(factors):
         order = np.arange(1, max(int(bins * step / float(factor)), 1) + 1)
@@ -70,7 +76,8 @@ def log_odds(
         worth, line = _cells(power, floor, at, windows)
         counts = np.arange(1, _TEETH + 1) if teeth is None else np.array([teeth])
         found[i] = logsumexp([_of_teeth(order, worth, line, int(each)) for each in counts]) - np.log(counts.size)
-    return found, np.zeros(0)
+        found[i] += _FOUND * (factor == 1)
+    return found
 
 
 def _of_teeth(order: np.ndarray, worth: FloatArray, line: FloatArray, teeth: int) -> float:
