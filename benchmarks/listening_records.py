@@ -54,11 +54,11 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _resonant(rng: np.random.Generator, n: int, rate: float, frequency: float, damping: float, white: FloatArray | None = None) -> FloatArray:
+def _resonant(rng: np.random.Generator, n: int, rate: float, frequency: float, damping: float) -> FloatArray:
     """Noise through one mode, of unit variance."""
     bins = np.fft.rfftfreq(n, 1.0 / rate) / frequency
     shape = 1.0 / (1.0 - bins**2 + 2j * damping * bins)
-    out = np.fft.irfft(np.fft.rfft(rng.standard_normal(n) if white is None else white) * shape, n)
+    out = np.fft.irfft(np.fft.rfft(rng.standard_normal(n)) * shape, n)
     return out / out.std()
 
 
@@ -123,7 +123,14 @@ def draw(seed: int, seconds: float = 6.0) -> MadeUp:
 
 
 def _add_chatter(
-    rng: np.random.Generator, signal: FloatArray, angle: FloatArray, rate: float, spindle: float, teeth: int, modes: list, level: FloatArray
+    rng: np.random.Generator,
+    signal: FloatArray,
+    angle: FloatArray,
+    rate: float,
+    spindle: float,
+    teeth: int,
+    modes: list[tuple[float, float]],
+    level: FloatArray,
 ) -> float:
     """Add a limit cycle near a mode with its sidebands at the tooth-passing frequency; its mean frequency [Hz]."""
     n, channels = signal.shape

@@ -33,7 +33,7 @@ _UNSTEADY = 0.02
 _IDLE_SHARE = 0.15
 #: Probability from which on lines beside the orders are chatter, and from which on it is not told; in what may be idle, also the least
 #: share of the record that they have to hold.
-_CHATTER, _DOUBT, _CHATTER_SHARE = 0.5, 0.2, 0.15
+_CHATTER, _DOUBT, _CHATTER_SHARE = 0.7, 0.5, 0.15
 #: Probability from which on a speed is named beside the likeliest, and below which the likeliest is not told from the others.
 _NAMED_SPEED, _LIKELY = 0.02, 0.5
 #: Most teeth that are looked for, and the share of the orders' power, or of that of chatter's sidebands, that their multiples hold.
@@ -350,6 +350,24 @@ def _beside(
     forced = 0.5 * np.mean(np.sum(np.abs(lines.amplitude[:, 1:]) ** 2, axis=1), axis=0)
     rest, typical = lines.rest(part, rotation.angle), _typical(part, rate)
     return off_orders(rest, forced, typical, rate, apparent, band, quantity is Quantity.ACCELERATION, teeth)
+
+
+def stands_beside(
+    part: FloatArray, rate: float, rotation: Rotation, quantity: Quantity, teeth: int | None
+) -> tuple[OffOrders, float]:
+    """Return the lines beside the orders of a part whose rotation is known, and the share of it that the orders explain.
+
+    Parameters
+    ----------
+    part : array, shape (n, c)
+    rate : float [Hz]
+    rotation : Rotation
+    quantity : Quantity
+    teeth : int or None
+    """
+    band = min(BAND, 0.5 * rate)
+    lines, rotation, _ = _lines(part, rate, band, rotation, rate < UNFILTERED and quantity is not Quantity.SOUND)
+    return _beside(part, rate, lines, rotation, band, quantity, teeth), lines.explained
 
 
 def heard_in_a_cut(part: FloatArray, rate: float, rotation: Rotation, teeth: int) -> Remark | None:

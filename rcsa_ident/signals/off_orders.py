@@ -34,7 +34,7 @@ _MAINS, _OFF, _HUM = (50.0, 60.0), 2e-3, 12
 _CENTRES, _BESIDE, _MISS = 4, 3, 2.0
 #: Logarithm of the odds of chatter: constant, and for each decade of its power over that of the orders, of that over the noise beside it,
 #: and of the probability that its sidebands are there by chance, at most so many; as made-up records say (`benchmarks listening`).
-_ODDS, _MOST_SIDES = np.array([-1.0, 3.0, 1.0, 0.5]), 4.0
+_ODDS, _MOST_SIDES = np.array([-0.87, 4.25, 0.60, 0.82]), 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +74,14 @@ def log_odds(evidence: FloatArray) -> float:
 
 
 def off_orders(
-    rest: FloatArray, forced: FloatArray, energy: float, rate: float, orders: FloatArray, band: float, twice_differentiated: bool, teeth: int | None
+    rest: FloatArray,
+    forced: FloatArray,
+    energy: float,
+    rate: float,
+    orders: FloatArray,
+    band: float,
+    twice_differentiated: bool,
+    teeth: int | None,
 ) -> OffOrders:
     """Return the lines of what is left of a record when its orders are taken away.
 
@@ -111,24 +118,28 @@ def off_orders(
     clear = np.all(np.abs(frequency[:, None] - orders) > reach, axis=1) & (frequency > 0.2 * spindle) & (frequency < band)
     excess, noise = _lines(power, clear, averages(int(quiet.sum())))
     hum, own = _hum(excess.max(axis=1, initial=0.0), frequency)
-    families = [
-        _family(excess[:, c], noise[:, c], ~own & clear, frequency, spindle, teeth, forced[c]) for c in range(excess.shape[1])
-    ]
-    families = [each for each in families if each is not None]
+    judged = [_family(excess[:, c], noise[:, c], ~own & clear, frequency, spindle, teeth, forced[c]) for c in range(excess.shape[1])]
+    families = [each for each in judged if each is not None]
     if not families:
         return OffOrders(np.zeros(0), 0.0, np.zeros(_SIDES), np.zeros(3), hum)
     strongest, evidence = max(families, key=lambda each: log_odds(each[1]))
     total = np.where(own, 0.0, excess.sum(axis=1))
+
+    def kin(of: int) -> tuple[FloatArray, FloatArray]:
+        off = (frequency - frequency[of]) / spindle
+        return np.where(np.abs(off - np.round(off)) < _FAMILY, total, 0.0), np.abs(np.round(off)).astype(int)
+
+    # a sideband has as many others beside it as the line itself
+    strongest = int(np.argmax(kin(strongest)[0]))
     found = _peaks(total, frequency, max(round(0.1 * spindle / bin_hz), 2), frequency[strongest])
     if twice_differentiated:
         # of what is no weaker than a tenth of the strongest, the largest motion is the structure's
         line = np.array([total[np.abs(frequency - each) < 0.1 * spindle].sum() for each in found])
         first = max((k for k in range(len(found)) if line[k] > 0.1 * line[0]), key=lambda k: line[k] / found[k] ** 4)
         found.insert(0, found.pop(first))
-    off = (frequency - frequency[strongest]) / spindle
-    kin = np.where(np.abs(off - np.round(off)) < _FAMILY, total, 0.0)
-    sides = np.bincount(np.minimum(np.abs(np.round(off)).astype(int), _SIDES + 1), kin, _SIDES + 2)[1:-1]
-    return OffOrders(np.array(found), float(kin.sum()) / (energy + 1e-300), sides, evidence, hum)
+    own_power, apart = kin(strongest)
+    sides = np.bincount(np.minimum(apart, _SIDES + 1), own_power, _SIDES + 2)[1:-1]
+    return OffOrders(np.array(found), float(own_power.sum()) / (energy + 1e-300), sides, evidence, hum)
 
 
 def _lines(power: FloatArray, clear: np.ndarray, windows: float) -> tuple[FloatArray, FloatArray]:
