@@ -25,6 +25,8 @@ REFERENCE, RANK = 32, 0.5
 _NEXT, _SECOND, _OVERLAP = 4.0 / 9.0, 1.0 / 36.0, 1.0 / 36.0
 #: Nodes and weights of the integral over the ordered cell's quantiles.
 _NODES = np.polynomial.legendre.leggauss(100)
+#: Power of the nodes, which brings them close to the least quantiles: alarms at small probabilities come from these.
+_CLOSE = 5.0
 #: Bins whose median tells the colour of the noise.
 _BAND = 40
 
@@ -58,8 +60,9 @@ def false_alarm(scale: float, shape: float, cells: int = REFERENCE) -> float:
     rank = max(round(RANK * cells), 1)
     node, weight = _NODES
     # the distribution of the ordered cell, over its own quantiles
-    order = betaincinv(rank, cells - rank + 1, 0.5 * (node + 1.0))
-    return float(np.sum(0.5 * weight * gammaincc(shape, scale * gammaincinv(shape, order))))
+    place = 0.5 * (node + 1.0)
+    order = betaincinv(rank, cells - rank + 1, place**_CLOSE)
+    return float(np.sum(0.5 * _CLOSE * place ** (_CLOSE - 1.0) * weight * gammaincc(shape, scale * gammaincinv(shape, order))))
 
 
 @lru_cache(maxsize=256)

@@ -31,11 +31,11 @@ _RAMP, _RAMP_OVER_WANDER = 0.01, 3.0
 _UNSTEADY = 0.02
 #: Explained share below which nothing cuts, if the teeth do not stand out either.
 _IDLE_SHARE = 0.15
-#: Probability from which on lines beside the orders are chatter, and from which on it is not told; in what may be idle, also the least
+#: Probability from which on lines beside the orders are chatter (of the made-up stable records fewer than one in fifty reach it), and from which on it is not told; in what may be idle, also the least
 #: share of the record that they have to hold.
-_CHATTER, _DOUBT, _CHATTER_SHARE = 0.7, 0.5, 0.15
-#: Probability from which on a speed is named beside the likeliest, and below which the likeliest is not told from the others.
-_NAMED_SPEED, _LIKELY = 0.02, 0.5
+_CHATTER, _DOUBT, _CHATTER_SHARE = 0.8, 0.5, 0.15
+#: Probability from which on a speed is named beside the likeliest.
+_NAMED_SPEED = 0.02
 #: Most teeth that are looked for, and the share of the orders' power, or of that of chatter's sidebands, that their multiples hold.
 _MOST_TEETH, _TOOTH_SHARE, _SIDEBAND_SHARE = 12, 0.8, 0.6
 #: How many times stronger than others lines are that stand out.
@@ -238,11 +238,12 @@ def listen(
         words = f"the longest even stretch, {stop - start:.2g} s at {rate:.4g} Hz, is too short, or its rate too low, to tell the speed"
         return replace(nothing, reasons=(words,))
     part = samples[loud]
-    found = find_rotation(part, rate, low, high, teeth)
+    fold = rate < UNFILTERED and quantity is not Quantity.SOUND
+    # folded orders stand where those of other speeds would: teeth do not tell one from the other there
+    found = find_rotation(part, rate, low, high, None if fold else teeth)
     if found is None:
         words = "there are no lines at the multiples of one frequency: the spindle does not turn, or is not heard"
         return replace(nothing, verdict=Heard.NO_CUT, reasons=(words,))
-    fold = rate < UNFILTERED and quantity is not Quantity.SOUND
     lines, rotation, folded = _lines(part, rate, band, found.rotation, fold)
     others = [(hertz, probability) for hertz, probability in found.odds[1:] if probability >= _NAMED_SPEED]
     answer = replace(
