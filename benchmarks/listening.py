@@ -1,7 +1,7 @@
 """How well `listen` tells chatter from stable cuts, and the spindle's speed from its multiples.
 
-``python -m benchmarks listening [--files FOLDER] [--records N]``. Made-up records (`benchmarks.listening_records`) whose seeds the odds were
-not fitted to, and real ones of a folder that lies beside the project: the same layout as ``shared/data``. The peer is the criterion
+``python -m benchmarks listening [--files FOLDER] [--records N]``. Made-up records (`benchmarks.listening_records`) whose seeds the odds
+were not fitted to, and real ones of a folder that lies beside the project: the same layout as ``shared/data``. The peer is the criterion
 that was used before: the share that lines beside the orders hold of the whole record, against 15 % and a quarter of the orders' share.
 ``--fit`` prints the weights of the odds, fitted by logistic regression to the first N seeds.
 """
@@ -102,7 +102,9 @@ def speeds() -> str:
         found = listen(made.samples, made.rate, made.quantity, made.teeth)
         if found.spindle_speed is not None and abs(to_hz(found.spindle_speed) / made.spindle - 1.0) < 1e-3:
             right.append(found.speed_probabilities[0])
-    return f"sounds with little run-out, teeth told: {len(right)} of {len(speeds_to_tell())} speeds right, probabilities from {min(right):.3f}"
+    return (
+        f"sounds with little run-out, teeth told: {len(right)} of {len(speeds_to_tell())} speeds right, probabilities from {min(right):.3f}"
+    )
 
 
 def weights(count: int) -> FloatArray:

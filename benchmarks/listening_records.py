@@ -143,7 +143,7 @@ def _add_chatter(
     phase = 2.0 * np.pi * np.cumsum(frequency * (1.0 + wander * _slow(rng, n, rate, rng.uniform(0.15, 1.0)))) / rate
     swell = np.exp(rng.uniform(0.0, 0.35) * _slow(rng, n, rate, rng.uniform(0.15, 1.0)))
     size, width = _log_uniform(rng, *_CHATTER), rng.uniform(0.5, 1.6)
-    heard = rng.uniform(0.3, 1.0, channels)
+    heard: FloatArray = rng.uniform(0.3, 1.0, channels)
     heard[int(rng.integers(channels))] = 1.0
     for k in range(-4, 5):
         own = frequency + k * teeth * spindle

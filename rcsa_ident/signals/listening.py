@@ -31,8 +31,8 @@ _RAMP, _RAMP_OVER_WANDER = 0.01, 3.0
 _UNSTEADY = 0.02
 #: Explained share below which nothing cuts, if the teeth do not stand out either.
 _IDLE_SHARE = 0.15
-#: Probability from which on lines beside the orders are chatter (of the made-up stable records fewer than one in fifty reach it), and from which on it is not told; in what may be idle, also the least
-#: share of the record that they have to hold.
+#: Probability from which on lines beside the orders are chatter (fewer than one in fifty of the made-up stable records reach it), and
+#: from which on it is not told; in what may be idle, also the least share of the record that they have to hold.
 _CHATTER, _DOUBT, _CHATTER_SHARE = 0.8, 0.5, 0.15
 #: Probability from which on a speed is named beside the likeliest.
 _NAMED_SPEED = 0.02
@@ -353,9 +353,7 @@ def _beside(
     return off_orders(rest, forced, typical, rate, apparent, band, quantity is Quantity.ACCELERATION, teeth)
 
 
-def stands_beside(
-    part: FloatArray, rate: float, rotation: Rotation, quantity: Quantity, teeth: int | None
-) -> tuple[OffOrders, float]:
+def stands_beside(part: FloatArray, rate: float, rotation: Rotation, quantity: Quantity, teeth: int | None) -> tuple[OffOrders, float]:
     """Return the lines beside the orders of a part whose rotation is known, and the share of it that the orders explain.
 
     Parameters

@@ -112,7 +112,9 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
         ramp = _ramp(whole, lowest, highest) if spare else ramp
         if ramp is not None:
             factor, odds = _whole_factor(whole, [ramp.rotation], lowest, highest, teeth)
-            turned = replace(ramp.rotation, angle=float(factor) * ramp.rotation.angle, information=ramp.rotation.information / float(factor) ** 2)
+            turned = replace(
+                ramp.rotation, angle=float(factor) * ramp.rotation.angle, information=ramp.rotation.information / float(factor) ** 2
+            )
             return FoundSpeed(turned, odds)
     if not fits:
         return None
@@ -152,16 +154,22 @@ def _whole_factor(
     odds: list[tuple[float, float, Fraction]] = []
     for place, rotation in enumerate(found):
         frequency = to_hz(rotation.spindle_speed)
-        factors = [each for each in multiples(teeth) if each == 1 or slowest <= frequency * each <= min(highest, HIGHEST_SHARE * heard.rate)]
+        factors = [
+            each for each in multiples(teeth) if each == 1 or slowest <= frequency * each <= min(highest, HIGHEST_SHARE * heard.rate)
+        ]
         log = log_odds(heard.samples, heard.rate, rotation.angle, factors, teeth)
-        odds += [(float(each), frequency * float(factor), Fraction(0) if place else factor) for each, factor in zip(log, factors, strict=True)]
+        odds += [
+            (float(each), frequency * float(factor), Fraction(0) if place else factor) for each, factor in zip(log, factors, strict=True)
+        ]
     # the number of teeth may speak against what was found; without it nothing but lines that others explain as well does
     first = odds[0][1] if teeth is None else max(odds, key=lambda each: each[0])[1]
     odds.sort(key=lambda each: (each[1] != first, -each[0]))
     apart = [each for i, each in enumerate(odds) if all(abs(np.log(each[1] / other[1])) > APART for other in odds[:i])]
     share = np.exp(np.array([each[0] for each in apart]) - max(each[0] for each in apart))
     share /= share.sum()
-    return apart[0][2], tuple((each[1], float(part)) for each, part in zip(apart, share, strict=True) if part > _UNLIKELY or each is apart[0])
+    return apart[0][2], tuple(
+        (each[1], float(part)) for each, part in zip(apart, share, strict=True) if part > _UNLIKELY or each is apart[0]
+    )
 
 
 def _parts(heard: LineGains, frequency: float, lowest: float) -> int:
