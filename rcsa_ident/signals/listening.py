@@ -385,7 +385,8 @@ def heard_in_a_cut(part: FloatArray, rate: float, rotation: Rotation, teeth: int
     beside = _beside(part, rate, lines, rotation, min(BAND, 0.5 * rate), Quantity.ACCELERATION, teeth)
     spindle = f"{to_hz(rotation.spindle_speed):.1f} Hz"
     silent = lines.explained < _IDLE_SHARE and _on_multiples(lines.power[1:], teeth) < _TOOTH_SHARE
-    if beside.probability > _CHATTER and (not silent or beside.share > _CHATTER_SHARE):
+    # what may be chatter is no stable cut to identify from
+    if beside.probability > _DOUBT and (not silent or beside.share > _CHATTER_SHARE):
         words = f"chatter: lines at no multiple of the spindle frequency, {spindle}, hold {min(beside.share, 1.0):.0%} of the record"
         return Remark(RecordCode.CHATTER, f"{words}; the structure's is at {beside.frequency[0]:.0f} Hz")
     if silent:
