@@ -38,6 +38,7 @@ CLAIMS = (
 STUDIES = (
     "study",
     "identification",
+    "listening",
     "search_trace",
     "lobes_truth",
     "slow_spindle",

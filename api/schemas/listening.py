@@ -60,7 +60,9 @@ class ListenAnswer(Answer):
     reasons: list[str] = Field(description="Sentences: why, and what was taken as given.")
     spindle_speed_rpm: float | None
     spindle_speed_std_rpm: float | None
-    other_speeds_rpm: list[float] = Field(description="That explain the record as well.")
+    other_speeds_rpm: list[float] = Field(description="That may be the spindle's instead.")
+    speed_probabilities: list[float] = Field(description="Of the spindle's speed and of the others, in this order.")
+    chatter_probability: float | None = Field(description="Of chatter, by the lines beside the orders.")
     speed_wander_percent: float | None
     ramp: tuple[float, float] | None = Field(description="First and last speed where it changes on purpose [rev/min].")
     teeth: int | None = Field(description="As told, or as heard.")

@@ -83,7 +83,9 @@ def _show(row: dict[str, Any]) -> None:
         if row["ramp"]:
             facts.append(f"ramp from {row['ramp'][0]:.0f} to {row['ramp'][1]:.0f} rev/min")
         if row["other_speeds_rpm"]:
-            facts.append("as well " + ", ".join(f"{each:.1f}" for each in row["other_speeds_rpm"]) + " rev/min")
+            own, *shares = row["speed_probabilities"]
+            others = [f"{each:.1f} rev/min ({share:.0%})" for each, share in zip(row["other_speeds_rpm"], shares, strict=True)]
+            facts.append(f"probability {own:.0%}, or else {', '.join(others)}")
         if row["teeth"]:
             facts.append(f"{row['teeth']} teeth")
         say(f"  {'; '.join(facts)}")

@@ -451,6 +451,8 @@ def listening_row(answer: Listening, channels: Sequence[str], remarks: Sequence[
         "spindle_speed_rpm": rpm(answer.spindle_speed),
         "spindle_speed_std_rpm": rpm(answer.spindle_speed_std),
         "other_speeds_rpm": [to_rpm(speed) for speed in answer.other_speeds],
+        "speed_probabilities": list(answer.speed_probabilities),
+        "chatter_probability": answer.chatter_probability,
         "speed_wander_percent": None if answer.wander is None else 100.0 * answer.wander,
         "ramp": None if answer.ramp is None else [to_rpm(speed) for speed in answer.ramp],
         "teeth": answer.teeth,

@@ -31,8 +31,11 @@ _RAMP, _RAMP_OVER_WANDER = 0.01, 3.0
 _UNSTEADY = 0.02
 #: Explained share below which nothing cuts, if the teeth do not stand out either.
 _IDLE_SHARE = 0.15
-#: Lines off the orders are chatter above this share of the record, and of what the orders explain.
-_CHATTER_SHARE, _CHATTER_OVER_ORDERS = 0.15, 0.25
+#: Probability from which on lines beside the orders are chatter (fewer than one in fifty of the made-up stable records reach it), and
+#: from which on it is not told; in what may be idle, also the least share of the record that they have to hold.
+_CHATTER, _DOUBT, _CHATTER_SHARE = 0.8, 0.5, 0.15
+#: Probability from which on a speed is named beside the likeliest.
+_NAMED_SPEED = 0.02
 #: Most teeth that are looked for, and the share of the orders' power, or of that of chatter's sidebands, that their multiples hold.
 _MOST_TEETH, _TOOTH_SHARE, _SIDEBAND_SHARE = 12, 0.8, 0.6
 #: How many times stronger than others lines are that stand out.
@@ -112,7 +115,11 @@ class Listening(Drawn):
     spindle_speed, spindle_speed_std : float or None [rad/s]
         Mean of the part; None where none was found.
     other_speeds : tuple of float [rad/s]
-        Speeds that explain the record as well.
+        Speeds that may be the spindle's instead: they differ by whole factors, or explain the record by other lines.
+    speed_probabilities : tuple of float
+        Probabilities of the spindle's speed and of the others, in this order; empty where no speed was found.
+    chatter_probability : float or None
+        That the cut chatters, given its lines beside the orders; None where no speed was found.
     wander : float or None
         Standard deviation of the speed in windows of a quarter of a second, about a ramp where there is one, as a share.
     ramp : (float, float) or None [rad/s]
@@ -154,6 +161,8 @@ class Listening(Drawn):
     spindle_speed: float | None = None
     spindle_speed_std: float | None = None
     other_speeds: tuple[float, ...] = ()
+    speed_probabilities: tuple[float, ...] = ()
+    chatter_probability: float | None = None
     wander: float | None = None
     ramp: tuple[float, float] | None = None
     teeth: int | None = None
@@ -229,13 +238,21 @@ def listen(
         words = f"the longest even stretch, {stop - start:.2g} s at {rate:.4g} Hz, is too short, or its rate too low, to tell the speed"
         return replace(nothing, reasons=(words,))
     part = samples[loud]
-    found = find_rotation(part, rate, low, high)
+    fold = rate < UNFILTERED and quantity is not Quantity.SOUND
+    # folded orders stand where those of other speeds would: teeth do not tell one from the other there
+    found = find_rotation(part, rate, low, high, None if fold else teeth)
     if found is None:
         words = "there are no lines at the multiples of one frequency: the spindle does not turn, or is not heard"
         return replace(nothing, verdict=Heard.NO_CUT, reasons=(words,))
-    fold = rate < UNFILTERED and quantity is not Quantity.SOUND
     lines, rotation, folded = _lines(part, rate, band, found.rotation, fold)
-    answer = replace(nothing, other_speeds=tuple(from_hz(each) for each in found.others), folded=folded, explained_share=lines.explained)
+    others = [(hertz, probability) for hertz, probability in found.odds[1:] if probability >= _NAMED_SPEED]
+    answer = replace(
+        nothing,
+        other_speeds=tuple(from_hz(hertz) for hertz, _ in others),
+        speed_probabilities=tuple(probability for _, probability in (*found.odds[:1], *others)),
+        folded=folded,
+        explained_share=lines.explained,
+    )
     return _judged(answer, part, rate, lines, rotation, quantity, teeth, between or _around(rotation), fold)
 
 
@@ -284,26 +301,40 @@ def _judged(
     fold: bool,
 ) -> Listening:
     """The answer with what is said of a part whose rotation is known."""
-    beside = _beside(part, rate, lines, rotation, answer.band, quantity)
     power, gap = lines.power[1:], quantity is Quantity.DISPLACEMENT
     teeth = told if gap else told or _teeth(power)
+    beside = _beside(part, rate, lines, rotation, answer.band, quantity, teeth)
     ramp, wander = _ramp(*rotation.speeds())
     answer = replace(
-        answer, spindle_speed=rotation.spindle_speed, spindle_speed_std=rotation.speed_std, wander=wander, ramp=ramp, teeth=teeth
+        answer,
+        spindle_speed=rotation.spindle_speed,
+        spindle_speed_std=rotation.speed_std,
+        wander=wander,
+        ramp=ramp,
+        teeth=teeth,
+        chatter_probability=beside.probability,
     )
     explained = max(lines.explained, 0.0)
-    if _chatters(beside, lines):
+    silent = explained < _IDLE_SHARE and not gap and (teeth is None or _on_multiples(power, teeth) < _TOOTH_SHARE)
+    if beside.probability > _CHATTER and (not silent or beside.share > _CHATTER_SHARE):
         return _chattering(answer, beside, rate, told or _teeth(beside.beside, _SIDEBAND_SHARE) or teeth, between, fold)
-    if explained < _IDLE_SHARE and not gap and (teeth is None or _on_multiples(power, teeth) < _TOOTH_SHARE):
+    if silent:
         words = f"the spindle's orders explain {explained:.0%} of the record and the teeth do not stand out among them: nothing is cut"
         return replace(answer, verdict=Heard.IDLE, reasons=(words,), teeth=told, lines=tuple(beside.frequency))
+    hum = () if beside.hum is None else (f"multiples of the mains, {beside.hum:.0f} Hz, are heard: they are not chatter",)
     if wander > _UNSTEADY:
         words = f"the speed changes by {wander:.1%} and not along a ramp"
-        return replace(answer, verdict=Heard.UNSTEADY, reasons=(words,), lines=tuple(beside.frequency))
+        return replace(answer, verdict=Heard.UNSTEADY, reasons=(words, *hum), lines=tuple(beside.frequency))
+    if beside.probability > _DOUBT:
+        words = (
+            f"lines beside the multiples of the spindle's frequency, the structure's may be {beside.frequency[0]:.1f} Hz: the record does "
+            f"not show whether they are chatter (probability {beside.probability:.0%})"
+        )
+        return replace(answer, verdict=Heard.UNSTEADY, reasons=(words, *hum), lines=tuple(beside.frequency))
     words = f"lines at multiples of the spindle's frequency explain {explained:.0%} of the record"
     if beside.frequency.size:
-        words += f", lines beside them {beside.share:.1%}"
-    reasons = [words]
+        words += f", lines beside them {beside.share:.1%} (probability of chatter {beside.probability:.1%})"
+    reasons = [words, *hum]
     if gap:
         reasons.append("a gap sensor sees run-out and roundness in the air, too: whether it cuts is not told")
     if teeth is not None and teeth % 2 == 0:
@@ -311,15 +342,31 @@ def _judged(
     return replace(answer, verdict=Heard.STABLE, reasons=tuple(reasons), lines=tuple(beside.frequency))
 
 
-def _beside(part: FloatArray, rate: float, lines: OrderLines, rotation: Rotation, band: float, quantity: Quantity) -> OffOrders:
+def _beside(
+    part: FloatArray, rate: float, lines: OrderLines, rotation: Rotation, band: float, quantity: Quantity, teeth: int | None
+) -> OffOrders:
     """Lines beside the orders of a part."""
     order = np.arange(1, lines.power.size)
     apparent = np.abs((order * to_hz(rotation.spindle_speed) + 0.5 * rate) % rate - 0.5 * rate)
-    return off_orders(lines.rest(part, rotation.angle), _typical(part, rate), rate, apparent, band, quantity is Quantity.ACCELERATION)
+    forced = 0.5 * np.mean(np.sum(np.abs(lines.amplitude[:, 1:]) ** 2, axis=1), axis=0)
+    rest, typical = lines.rest(part, rotation.angle), _typical(part, rate)
+    return off_orders(rest, forced, typical, rate, apparent, band, quantity is Quantity.ACCELERATION, teeth)
 
 
-def _chatters(beside: OffOrders, lines: OrderLines) -> bool:
-    return beside.share > max(_CHATTER_SHARE, _CHATTER_OVER_ORDERS * max(lines.explained, 0.0))
+def stands_beside(part: FloatArray, rate: float, rotation: Rotation, quantity: Quantity, teeth: int | None) -> tuple[OffOrders, float]:
+    """Return the lines beside the orders of a part whose rotation is known, and the share of it that the orders explain.
+
+    Parameters
+    ----------
+    part : array, shape (n, c)
+    rate : float [Hz]
+    rotation : Rotation
+    quantity : Quantity
+    teeth : int or None
+    """
+    band = min(BAND, 0.5 * rate)
+    lines, rotation, _ = _lines(part, rate, band, rotation, rate < UNFILTERED and quantity is not Quantity.SOUND)
+    return _beside(part, rate, lines, rotation, band, quantity, teeth), lines.explained
 
 
 def heard_in_a_cut(part: FloatArray, rate: float, rotation: Rotation, teeth: int) -> Remark | None:
@@ -335,12 +382,14 @@ def heard_in_a_cut(part: FloatArray, rate: float, rotation: Rotation, teeth: int
     teeth : int
     """
     lines, rotation, _ = _lines(part, rate, min(BAND, 0.5 * rate), rotation, rate < UNFILTERED)
-    beside = _beside(part, rate, lines, rotation, min(BAND, 0.5 * rate), Quantity.ACCELERATION)
+    beside = _beside(part, rate, lines, rotation, min(BAND, 0.5 * rate), Quantity.ACCELERATION, teeth)
     spindle = f"{to_hz(rotation.spindle_speed):.1f} Hz"
-    if _chatters(beside, lines):
+    silent = lines.explained < _IDLE_SHARE and _on_multiples(lines.power[1:], teeth) < _TOOTH_SHARE
+    # what may be chatter is no stable cut to identify from
+    if beside.probability > _DOUBT and (not silent or beside.share > _CHATTER_SHARE):
         words = f"chatter: lines at no multiple of the spindle frequency, {spindle}, hold {min(beside.share, 1.0):.0%} of the record"
         return Remark(RecordCode.CHATTER, f"{words}; the structure's is at {beside.frequency[0]:.0f} Hz")
-    if lines.explained < _IDLE_SHARE and _on_multiples(lines.power[1:], teeth) < _TOOTH_SHARE:
+    if silent:
         words = f"no cutting: multiples of the spindle frequency, {spindle}, explain {max(lines.explained, 0.0):.0%} of the record"
         return Remark(RecordCode.NO_CUTTING, f"{words}, and the teeth do not stand out among them")
     return None
@@ -364,7 +413,7 @@ def _chattering(
     aliases = aliases if fold else [strongest]
     words = [
         f"lines at no multiple of the spindle's frequency, {frequency:.2f} Hz, hold {beside.share:.0%} of the record; the structure's "
-        f"is {strongest:.1f} Hz"
+        f"is {strongest:.1f} Hz (probability of chatter {beside.probability:.0%})"
     ]
     suggested: list[float] = []
     if len(aliases) > 1:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +14,8 @@ from rcsa_ident.signals._kernels import comb_scores, sideband_scores
 from rcsa_ident.signals.line_gain import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.order_lines import OrderLines, order_lines
 from rcsa_ident.signals.rotation import ORDERS, RAMP, Rotation, follow, speed_path
+from rcsa_ident.signals.speed_odds import log_odds, multiples
+from rcsa_ident.units import to_hz
 
 #: Length of the windows in which the speed is looked for [s]: fine enough for lines that lie close.
 _LONG = 4.0
@@ -42,6 +46,8 @@ _TELLS, _CLEARLY = 0.1, 1.02
 _RAMP_EXPLAINS, _RAMP_CLEARLY = 0.3, 1.2
 #: Revolutions in a window of the fit.
 TURNS = 8.0
+#: Probability below which a speed is not named.
+_UNLIKELY = 1e-3
 #: Samples in which candidates are compared, from the middle of a longer record.
 _COMPARED = 1 << 17
 
@@ -53,12 +59,12 @@ class FoundSpeed:
     Parameters
     ----------
     rotation : Rotation
-    others : tuple of float [Hz]
-        Frequencies that explain the record as well.
+    odds : tuple of (float [Hz], float)
+        Frequencies that may be the spindle's and their probabilities, the likeliest first; those of the least probability left out.
     """
 
     rotation: Rotation
-    others: tuple[float, ...] = ()
+    odds: tuple[tuple[float, float], ...] = ()
 
 
 class _Fit(NamedTuple):
@@ -80,12 +86,12 @@ def window_length(rate: float, frequency: float, samples: int) -> int:
     return min(round(max(WINDOW, TURNS / frequency) * rate), samples)
 
 
-def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: float) -> FoundSpeed | None:
+def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: float, teeth: int | None = None) -> FoundSpeed | None:
     """Return how the spindle turns, found between two frequencies; None where nothing is heard of it.
 
     Long windows tell the candidates: frequencies at whose multiples, and at whose spacing beside the strongest lines, there are
-    lines. Those that explain as much as the best one belong together; of these the spindle's is the highest of which all lines
-    are multiples.
+    lines. Those that explain as much as the best one belong together; of these the highest of which all lines are multiples is the
+    spindle's, or differs from it by a whole factor: which one, `log_odds` says.
 
     Parameters
     ----------
@@ -93,6 +99,8 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
         Of a cut, or of a spindle that idles.
     rate : float [Hz]
     lowest, highest : float [Hz]
+    teeth : int or None
+        As told.
     """
     spare = max(samples.shape[0] - _COMPARED, 0) // 2
     middle = LineGains(samples[spare : samples.shape[0] - spare], rate)
@@ -103,7 +111,11 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
     if ramp is not None and ramp.explained > max(_RAMP_EXPLAINS, _RAMP_CLEARLY * most):
         ramp = _ramp(whole, lowest, highest) if spare else ramp
         if ramp is not None:
-            return FoundSpeed(ramp.rotation)
+            factor, odds = _whole_factor(whole, [ramp.rotation], lowest, highest, teeth)
+            turned = replace(
+                ramp.rotation, angle=float(factor) * ramp.rotation.angle, information=ramp.rotation.information / float(factor) ** 2
+            )
+            return FoundSpeed(turned, odds)
     if not fits:
         return None
     members = [fit for fit in fits if fit.explained >= _EXPLAINS * most] if most > _TELLS else fits[:1]
@@ -116,19 +128,48 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
     parts = _parts(middle, frequency, lowest) if most > _CLEAN else 1
     if parts > 1 and _shares(_fitted(middle, frequency / parts).lines.power, parts) > _BETWEEN:
         frequency /= parts
+    known = {fit.frequency: fit for fit in fits}
+    chosen = known[frequency] if frequency in known else _fitted(middle, frequency)
     # a member that the spindle's multiples do not hold explains as much by other lines
-    others = tuple(
-        fit.frequency
+    others = [
+        fit.rotation
         for fit in members
         if fit.frequency > frequency and abs(fit.frequency / frequency - round(fit.frequency / frequency)) > APART
-    )
-    known = {fit.frequency: fit.rotation for fit in fits} if spare == 0 else {}
-    if frequency in known:
-        return FoundSpeed(known[frequency], others)
-    if spare and best.followed:
+    ]
+    factor, odds = _whole_factor(middle, [chosen.rotation, *others], lowest, highest, teeth)
+    frequency = odds[0][0]
+    if factor == 1 and spare == 0:
+        return FoundSpeed(chosen.rotation, odds)
+    if spare and chosen.followed:
         # a constant speed that does not do for the middle does not for the whole
-        return FoundSpeed(follow(samples, rate, *_path(whole, frequency)), others)
-    return FoundSpeed(_fitted(whole, frequency).rotation, others)
+        return FoundSpeed(follow(samples, rate, *_path(whole, frequency)), odds)
+    return FoundSpeed(_fitted(whole, frequency).rotation, odds)
+
+
+def _whole_factor(
+    heard: LineGains, found: Sequence[Rotation], lowest: float, highest: float, teeth: int | None
+) -> tuple[Fraction, tuple[tuple[float, float], ...]]:
+    """The factor between the first rotation found and the spindle, 0 where it is another, and frequencies [Hz] with probabilities."""
+    slowest = max(lowest, TURNS * heard.rate / heard.samples.shape[0])
+    odds: list[tuple[float, float, Fraction]] = []
+    for place, rotation in enumerate(found):
+        frequency = to_hz(rotation.spindle_speed)
+        factors = [
+            each for each in multiples(teeth) if each == 1 or slowest <= frequency * each <= min(highest, HIGHEST_SHARE * heard.rate)
+        ]
+        log = log_odds(heard.samples, heard.rate, rotation.angle, factors, teeth)
+        odds += [
+            (float(each), frequency * float(factor), Fraction(0) if place else factor) for each, factor in zip(log, factors, strict=True)
+        ]
+    # the number of teeth may speak against what was found; without it nothing but lines that others explain as well does
+    first = odds[0][1] if teeth is None else max(odds, key=lambda each: each[0])[1]
+    odds.sort(key=lambda each: (each[1] != first, -each[0]))
+    apart = [each for i, each in enumerate(odds) if all(abs(np.log(each[1] / other[1])) > APART for other in odds[:i])]
+    share = np.exp(np.array([each[0] for each in apart]) - max(each[0] for each in apart))
+    share /= share.sum()
+    return apart[0][2], tuple(
+        (each[1], float(part)) for each, part in zip(apart, share, strict=True) if part > _UNLIKELY or each is apart[0]
+    )
 
 
 def _parts(heard: LineGains, frequency: float, lowest: float) -> int:

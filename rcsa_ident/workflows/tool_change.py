@@ -15,10 +15,12 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.errors import InputError
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
+from rcsa_ident.plausibility import SEARCHED_DEPTH, SPINDLE_SPEED
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.label_noise import LabelNoise
 from rcsa_ident.stability.lobes import (

@@ -16,6 +16,7 @@ from rcsa_ident.io.hdf5 import write_hdf5
 KEYS = {
     "spindle_speed_rpm", "spindle_speed_std_rpm", "speed_wander_percent", "ramp", "teeth", "explained_share", "verdict", "reasons",
     "chatter_frequencies_hz", "chatter_aliases_hz", "chatter_lines_hz", "suggested_speeds_rpm", "events",
+    "other_speeds_rpm", "speed_probabilities", "chatter_probability",
 }  # fmt: skip
 
 

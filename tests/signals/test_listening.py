@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.listening_records import speeds_to_tell
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.listening import Heard, listen
 from rcsa_ident.signals.recording import Quantity
@@ -205,3 +206,51 @@ def test_what_cannot_be_listened_to_is_named(samples, rate, options, field):
     with pytest.raises(InputError) as found:
         listen(samples, rate, **options)
     assert found.value.field == field
+
+
+def test_chatter_in_broad_noise_is_judged_by_what_lies_around_it():
+    """A line stronger than the tooth's, with a sideband, in a record that is mostly noise: few hundredths of everything."""
+    orders = {1: 0.1, 2: 0.15, 4: 0.5, 8: 0.2}
+    samples, _ = record(8192.0, 6.0, 6900.0, orders, noise=1.6)
+    time = np.arange(samples.shape[0]) / 8192.0
+    sides = ((307.0, 0.6), (307.0 + 460.0, 0.25))
+    samples = samples + sum(a * np.cos(2.0 * np.pi * f * time) for f, a in sides)[:, None]
+    answer = listen(samples, 8192.0, teeth=4, spindle_speed=from_rpm(6900.0))
+    assert answer.verdict is Heard.CHATTER
+    assert answer.chatter[0] == pytest.approx(307.0, abs=0.5)
+    assert answer.chatter_probability > 0.8
+
+
+@pytest.mark.parametrize("mains", [50.0, 60.0])
+def test_hum_is_no_chatter(mains):
+    samples, _ = record(8192.0, 6.0, 6870.0)
+    time = np.arange(samples.shape[0]) / 8192.0
+    samples = samples + 0.8 * sum(np.cos(2.0 * np.pi * k * mains * time) / k for k in (1, 2, 3, 5))[:, None]
+    answer = listen(samples, 8192.0, Quantity.SOUND, teeth=4, spindle_speed=from_rpm(6870.0))
+    assert answer.verdict is Heard.STABLE
+    assert f"multiples of the mains, {mains:.0f} Hz, are heard" in answer.reasons[1]
+
+
+def test_chatter_in_one_channel_of_several_is_found():
+    samples, _ = record(8192.0, 6.0, 6870.0, channels=3)
+    time = np.arange(samples.shape[0]) / 8192.0
+    samples *= [10.0, 10.0, 0.3]
+    samples[:, 2] += 0.8 * np.cos(2.0 * np.pi * 933.0 * time) + 0.3 * np.cos(2.0 * np.pi * (933.0 - 458.0) * time)
+    assert listen(samples, 8192.0, teeth=4).verdict is Heard.CHATTER
+
+
+@pytest.mark.parametrize("case", range(0, 24, 3))
+def test_the_told_number_of_teeth_finds_the_speed(case):
+    made = speeds_to_tell(case + 1)[case]
+    answer = listen(made.samples, made.rate, made.quantity, made.teeth)
+    assert answer.spindle_speed / (2.0 * np.pi) == pytest.approx(made.spindle, rel=1e-4)
+    assert answer.speed_probabilities[0] > 0.5
+    assert len(answer.speed_probabilities) == 1 + len(answer.other_speeds)
+
+
+def test_speeds_that_cannot_be_told_apart_are_said_with_their_probabilities():
+    """No line of the run-out: lines at multiples of 300 Hz are those of three teeth at 6000 rev/min, likely, or of a faster spindle."""
+    samples, _ = record(12800.0, 3.0, 18000.0, {1: 1.0, 2: 0.9, 3: 1.2, 4: 0.5}, noise=1.5)
+    answer = listen(samples, 12800.0, Quantity.SOUND, teeth=3)
+    assert 0.0 < sum(answer.speed_probabilities) <= 1.0 + 1e-9
+    assert {round(to_rpm(each), -2) for each in (answer.spindle_speed, *answer.other_speeds)} >= {6000.0, 18000.0}

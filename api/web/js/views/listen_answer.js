@@ -81,6 +81,7 @@ function next(found) {
   );
 }
 
+const share = (of) => `${plain(100 * of)} %`;
 const fact = (name, value, kind = null) => h("div", { class: kind }, h("dt", null, name), h("dd", null, value));
 
 function facts(found) {
@@ -90,7 +91,11 @@ function facts(found) {
     "dl",
     { class: "facts" },
     speed === null ? null : fact("Spindle speed", `${plain(speed, 1, 1)} ± ${significant(found.spindle_speed_std_rpm, 2)} rev/min`),
-    found.other_speeds_rpm.length ? fact("Or as well", `${found.other_speeds_rpm.map((each) => plain(each, 1)).join(", ")} rev/min`) : null,
+    found.other_speeds_rpm.length ? fact("Probability of this speed", share(found.speed_probabilities[0])) : null,
+    found.other_speeds_rpm.length
+      ? fact("Or else", found.other_speeds_rpm.map((each, i) => `${plain(each, 1)} rev/min (${share(found.speed_probabilities[i + 1])})`).join(", "))
+      : null,
+    found.chatter_probability === null ? null : fact("Probability of chatter", share(found.chatter_probability)),
     found.ramp ? fact("It changes", `${plain(found.ramp[0])} to ${plain(found.ramp[1])} rev/min`) : null,
     found.speed_wander_percent === null ? null : fact("Wander of the speed", `${significant(found.speed_wander_percent, 2)} %`),
     fact("Teeth", found.teeth === null ? "not heard" : plain(found.teeth)),
