@@ -245,7 +245,7 @@ TIP_STIFFNESS = Range(
     "N/m",
     1.0,
     (1e5, 2e9),
-    (1e3, 1e12),
+    (1e3, 1e15),
     (
         ("were natural frequencies given in Hz where rad/s is asked for ({})?", 4.0 * math.pi**2),
         ("was it given in N/µm ({})?", 1e6),

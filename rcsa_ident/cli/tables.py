@@ -27,8 +27,9 @@ from rcsa_ident.report.summaries import (
     whole_mode_rows,
 )
 from rcsa_ident.report.workpiece_side import side_captions, side_mode_rows
-from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, PlannedCut, SpeedWindow
+from rcsa_ident.stability.advice import Advice, PlannedCut, SpeedWindow
 from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.stability.operating_point import Bound, OperatingPoint
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,7 @@ def _path_of(table: TextTable) -> ToolPath:
     if SPEED in columns:
         right = np.isnan(columns[SPEED]) | ((columns[SPEED] >= 0.0) & np.isfinite(columns[SPEED]))
         _check(table, SPEED, columns[SPEED], right, "0 or more, or nothing [rev/min]")
-    given: dict[str, FloatArray] = {"line": np.array(table.numbers)}
+    given: dict[str, Any] = {"line": np.array(table.numbers)}
     if axis:
         given["axes"] = np.stack([columns[name] for name in axis], axis=1)
         none = np.flatnonzero(np.linalg.norm(given["axes"], axis=1) == 0.0)

@@ -193,7 +193,20 @@ def _function(lines: _Lines, binary: bool, head: Sequence[bytes], system: tuple[
     names = [name for name in dict.fromkeys(names) if name and name.upper() != "NONE"]
     factors, spacing = (1.0, 1.0) if system is None else system, step if even else 0.0
     return UffFunction(
-        kind, abscissa, values, response, reference, *axes[:3], known, factors, where, tuple(names), spacing, system is not None
+        kind,
+        abscissa,
+        values,
+        response,
+        reference,
+        axes[0],
+        axes[1],
+        axes[2],
+        known,
+        factors,
+        where,
+        tuple(names),
+        spacing,
+        system is not None,
     )
 
 

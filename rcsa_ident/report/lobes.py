@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
-from rcsa_ident.stability.advice import OperatingPoint, UsableDepths
+from rcsa_ident.stability.advice import UsableDepths
+from rcsa_ident.stability.operating_point import OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError

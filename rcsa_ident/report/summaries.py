@@ -19,8 +19,9 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.tap import TapFrf
-from rcsa_ident.stability.advice import Advice, HeldBack, OperatingPoint, PlannedCut
+from rcsa_ident.stability.advice import Advice, PlannedCut
 from rcsa_ident.stability.dominance import BandShares
+from rcsa_ident.stability.operating_point import HeldBack, OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.tool_holder.learned import LearnedValue

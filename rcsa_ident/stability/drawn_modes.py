@@ -23,10 +23,12 @@ _FLOOR = 1e-2
 _SMALL, _CHANGES = 5e-3, 8
 #: Distance of the poles beside each known one, in half-power bandwidths: together they move as the mode does.
 _BESIDE = 0.3
-#: Change of a logarithm of the depth at which a secant's step ends, most steps, and how far they may lead from where they began.
-_NEAR, _STEPS, _FAR = 0.02, 6, np.log(2.0)
-#: Share of the depth between the two looks that tell how the growth changes with it, and tolerance of a search from the bottom.
-_APART, _TOLERANCE = 0.01, 5e-3
+#: Change of the logarithm of the depth at which secant steps end, their largest, their number, and how far they may lead away.
+_NEAR, _LONGEST, _STEPS, _FAR = 0.02, 0.5, 8, 1.5
+#: Share of the depth between the two looks that tell how the growth changes with it.
+_APART = 0.01
+#: Share of the guess from which, and tolerance to which, the limit is looked for where these steps do not find it.
+_FROM, _TOLERANCE = 0.05, 5e-3
 _METHOD = FullDiscretisation()
 
 
@@ -85,7 +87,7 @@ def _loss_near(growth: Growth, guess: float, slope: float, deepest: float) -> fl
     for _ in range(_STEPS):
         if not slope > 0.0:
             break
-        change = -value / slope
+        change = float(np.clip(-value / slope, -_LONGEST, _LONGEST))
         if at + change >= np.log(deepest) and value < 0.0:
             change = np.log(deepest) - at
             if change <= 0.0:
@@ -98,7 +100,7 @@ def _loss_near(growth: Growth, guess: float, slope: float, deepest: float) -> fl
         at += change
         value = growth(float(np.exp(at)))
         slope = (value - before) / (at - last)
-    found = first_loss(growth, 1e-3 * guess, deepest, _TOLERANCE, careful_from=islands_from(growth.cut.process))
+    found = first_loss(growth, _FROM * guess, deepest, _TOLERANCE, careful_from=islands_from(growth.cut.process))
     return np.inf if found is None else found
 
 

@@ -14,22 +14,12 @@ from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import BareCutter
 from rcsa_ident.plausibility import AXIAL_DEPTH, SPINDLE_SPEED
-from rcsa_ident.stability.advice import (
-    Advice,
-    Bound,
-    HeldBack,
-    OperatingPoint,
-    UsableDepths,
-    highest_removal,
-    operating_point,
-    planned_cut,
-    speed_windows,
-    usable_depths,
-)
+from rcsa_ident.stability.advice import Advice, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import Growth, longest_step
+from rcsa_ident.stability.operating_point import Bound, HeldBack, OperatingPoint, operating_point
 from rcsa_ident.stability.pockets import AROUND, least_within_tolerance, pad_speeds, speeds_around
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.tested_cuts import TestedCuts

@@ -22,6 +22,7 @@ from rcsa_ident.io.setups import tooling_of
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.tool_holder.catalogue import holder
 from rcsa_ident.workflows import tool_change
+from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import ToolChange, tooltip
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
@@ -33,7 +34,7 @@ RPM = math.pi / 30.0
 
 
 def by_workflow(result, tooling, speeds):
-    return ToolChange(machine_from_json(json.loads(result), ""), tooling, CutSpec(), speeds, 0.01).limits()
+    return advise(ToolChange(machine_from_json(json.loads(result), ""), tooling, CutSpec(), speeds, 0.01))
 
 
 @pytest.fixture
@@ -50,11 +51,19 @@ def test_lobes_are_those_of_the_command(client, tmp_path, tooling, softening):
     client.identify(id, result)
     client.write_tooling("T1", by_hand.TOOLING)
     (found,) = client.lobes(id, "T1", speeds=SPEEDS).toolings
-    expected = by_workflow(result, tooling, np.arange(6000.0, 9001.0, 500.0) * RPM)
+    advice = by_workflow(result, tooling, np.arange(6000.0, 9001.0, 500.0) * RPM)
+    expected = advice.lobes
     assert found.spindle_speed_rpm == [6000.0, 6500.0, 7000.0, 7500.0, 8000.0, 8500.0, 9000.0]
     np.testing.assert_allclose(found.limit_depth_mm, expected.limit_depth * 1e3, rtol=1e-9)
     np.testing.assert_allclose(found.chatter_frequency_hz, expected.chatter_frequency / (2.0 * np.pi), rtol=1e-8)
-    np.testing.assert_allclose([found.limit_depth_low_mm, found.limit_depth_high_mm], np.array(expected.band) * 1e3, rtol=1e-4)
+    # a preview has no band; the limits around the recommended cuts have their own
+    assert (found.limit_depth_low_mm, found.limit_depth_high_mm) == (None, None)
+    assert [cut.recommended_depth_mm for cut in found.recommended] == [
+        pytest.approx(1e3 * point.depth, rel=1e-9) if np.isfinite(point.depth) else None for point in advice.recommended
+    ]
+    for own, known in zip(found.around, advice.around, strict=True):
+        np.testing.assert_allclose(own.limit_depth_mm, 1e3 * known.limit_depth, rtol=1e-9)
+        np.testing.assert_allclose([own.limit_depth_low_mm, own.limit_depth_high_mm], 1e3 * np.array(known.band), rtol=1e-6)
     assert found.lobe == expected.lobe.tolist()
     assert found.tooling == "T1"
     assert found.warnings[0].startswith("the identification is suspect")

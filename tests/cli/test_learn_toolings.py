@@ -24,7 +24,8 @@ def one_cut(tmp_path_factory):
     """The first of the sample runs, of a tooling whose drawing is an honest one's."""
     folder = part_of_the_sample_runs(tmp_path_factory.mktemp("one"), 1000)
     for path in (folder / "toolings").glob("*.toml"):
-        path.write_text(path.read_text(encoding="utf-8") + "\n[spread]\n", encoding="utf-8")
+        known, *_ = path.read_text(encoding="utf-8").partition("[spread]")
+        path.write_text(known + "\n[spread]\n", encoding="utf-8")
     return folder
 
 

@@ -469,7 +469,7 @@ def test_half_a_percent_is_asked_about(shop):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--ktc-mpa", 2.1, "--krc", 0.3), "--ktc-mpa: found 2.1 MPa, allowed is a number at least 5"),
+        (("--ktc-mpa", 2.1, "--krc", 0.3), "--ktc-mpa: found 2.1 MPa, allowed is a number at least 30"),
         (("--ktc-mpa", 900, "--krc", 26), "--krc: found 26, allowed is"),
         ((*KNOWN, "--feed-per-tooth-mm", 100), "--feed-per-tooth-mm: found 100 mm"),
         ((*KNOWN, "--kre-n-per-mm", 12000), "--kre-n-per-mm: found 12000 N/mm"),

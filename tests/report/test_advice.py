@@ -9,7 +9,8 @@ import pytest
 
 from rcsa_ident.report.advice import Mark, advice_figure, comparison_figure, usable_figure
 from rcsa_ident.report.figures import svg
-from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, UsableDepths
+from rcsa_ident.stability.advice import Advice, UsableDepths
+from rcsa_ident.stability.operating_point import Bound, OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes
 
 SPEED = np.linspace(400.0, 2000.0, 81)

@@ -9,7 +9,8 @@ import pytest
 
 from rcsa_ident.report.figures import svg
 from rcsa_ident.report.lobes import Judged, Panel, cases_figure, save_figure, stability_figure
-from rcsa_ident.stability.advice import Bound, OperatingPoint, UsableDepths
+from rcsa_ident.stability.advice import UsableDepths
+from rcsa_ident.stability.operating_point import Bound, OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.surface_error import SurfaceError, Wall
 from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict, tally

@@ -11,9 +11,10 @@ from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.io.lobes import read_lobes, write_lobes
 from rcsa_ident.report.summaries import lobes_summary
-from rcsa_ident.stability.advice import Advice, Bound, highest_removal, speed_windows, usable_depths
+from rcsa_ident.stability.advice import Advice, highest_removal, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.operating_point import Bound
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.stability.mills import HALF, RPM, tip

@@ -82,7 +82,7 @@ function comparison(found, summaries, question) {
     limit("Stability limit", (r) => r.best),
     column("Removes", "removal", (r) => r.best?.removal_rate_cm3_per_min),
   ];
-  const box = card("Side by side", null, table("Toolings side by side", columns, rows), rows.length ? heldBack(rows[0].best) : null);
+  const box = card("Side by side", null, table("Toolings side by side", columns, rows), rows.length ? heldBack(rows[0].best, (found.advice ?? found.lobes)[0].recommended_by) : null);
   box.classList.add("wide");
   return box;
 }

@@ -95,7 +95,7 @@ export function headline(found, question) {
             ]),
           )
         : null,
-      heldBack(best),
+      heldBack(best, told(found, i).recommended_by),
       bandOf(found, i),
       drawing,
       question.tip ? null : cardLink(lobes.tooling),
@@ -134,8 +134,8 @@ const unlimited = (cut, question) =>
         ],
   );
 
-/** How the recommended depth follows from the stability limit, step by step. */
-export function heldBack(cut) {
+/** How the recommended depth follows from the stability limit, step by step, and which method computed it. */
+export function heldBack(cut, by) {
   const steps = cut?.held_back;
   if (!steps || cut.limit_depth_mm === null) return null;
   const chain = [
@@ -149,7 +149,7 @@ export function heldBack(cut) {
     { class: "soft small held-back" },
     `At ${plain(cut.spindle_speed_rpm)} rev/min: `,
     chain.map((each, k) => [k ? " → " : "", each]),
-    ".",
+    by ? `. Computed by ${by}.` : ".",
   );
 }
 
