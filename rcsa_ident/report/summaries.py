@@ -270,6 +270,7 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
         "recommended": [_point(point, lobes) for point in advice.recommended],
         "withheld": lobes.withheld or None,
         "band": band_summary(advice.band),
+        "around": [_limits(each) for each in advice.around],
         "flip_speeds": int(lobes.flip.sum()),
         "tested": None if advice.tested is None else tally_summary(advice.tested),
     }
@@ -287,7 +288,6 @@ def lobes_curves(advice: Advice) -> dict[str, Any]:
         "recommended_depth_mm": _finite_list(1e3 * recommended),
         "lobe": [None if n < 0 else n for n in lobes.lobe.tolist()],
         "flip": lobes.flip.tolist(),
-        "around": [_limits(each) for each in advice.around],
     }
 
 

@@ -32,6 +32,9 @@ _NAMED, _MOST = 0.03, 12
 _MAINS, _OFF, _HUM = (50.0, 60.0), 2e-3, 12
 #: Lines of a channel that may be chatter's strongest, sidebands of it to each side, and by how many bins these may be off.
 _CENTRES, _BESIDE, _MISS = 4, 3, 2.0
+#: Share of the record, and decades over the power of the orders, from which on a line beside the orders is chatter at least so probably,
+#: with sidebands or without: forced vibration has none so strong.
+_STRONG, _OVER_ORDERS, _AT_LEAST = 0.15, np.log10(0.25), 0.9
 #: Logarithm of the odds of chatter: constant, and for each decade of its power over that of the orders, of that over the noise beside it,
 #: and of the probability that its sidebands are there by chance, at most so many; as made-up records say (`benchmarks listening`).
 _ODDS, _MOST_SIDES = np.array([-0.87, 4.25, 0.60, 0.82]), 4.0
@@ -65,7 +68,10 @@ class OffOrders:
     @property
     def probability(self) -> float:
         """That a cut with these lines chatters."""
-        return float(1.0 / (1.0 + np.exp(-log_odds(self.evidence)))) if self.frequency.size else 0.0
+        if not self.frequency.size:
+            return 0.0
+        strong = self.share > _STRONG and self.evidence[0] > _OVER_ORDERS
+        return max(float(1.0 / (1.0 + np.exp(-log_odds(self.evidence)))), _AT_LEAST * strong)
 
 
 def log_odds(evidence: FloatArray) -> float:

@@ -411,8 +411,8 @@ class Advice(Drawn):
 
     @property
     def preview(self) -> bool:
-        """Whether the lobes are zero-order ones: they say where to look, not how deep one may cut."""
-        return self.lobes.method == MethodName.ZERO_ORDER
+        """Whether the lobes are zero-order ones beside cuts of another method: they say where to look, not how deep one may cut."""
+        return self.lobes.method == MethodName.ZERO_ORDER != self.recommended_by
 
     @property
     def drawn_around(self) -> tuple[StabilityLobes, ...] | None:

@@ -226,7 +226,7 @@ def own_drawn_limits(
 
     Notes
     -----
-    Of many speeds some `APART` from each other are asked, and those where the limit is highest or lowest beside its neighbours; between
+    Of the speeds some `APART` from each other are asked, and those where the limit is highest or lowest beside its neighbours; between
     them the ratio to the limit of the tip itself is a straight line.
     """
     drawn, speeds, deepest = _draws(tip, process, draws, seed), known.spindle_speed, known.max_depth
@@ -250,13 +250,11 @@ def own_drawn_limits(
 
 
 def _telling(speeds: FloatArray, limit: FloatArray) -> NDArray[np.intp]:
-    """Places of rising speeds that tell a curve: some far apart, its peaks and valleys, and their neighbours."""
+    """Places of rising speeds that tell a curve: some far apart, its peaks and valleys."""
     step = np.floor(np.log(speeds / speeds[0]) / np.log1p(APART))
     kept = np.concatenate([[True], np.diff(step) > 0.0])
     kept[-1] = True
-    turns = np.flatnonzero((limit[1:-1] - limit[:-2]) * (limit[2:] - limit[1:-1]) < 0.0) + 1
-    for beside in (-1, 0, 1):
-        kept[turns + beside] = True
+    kept[1:-1] |= (limit[1:-1] - limit[:-2]) * (limit[2:] - limit[1:-1]) < 0.0
     return np.flatnonzero(kept)
 
 

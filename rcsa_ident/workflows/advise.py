@@ -13,7 +13,7 @@ from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import BareCutter
-from rcsa_ident.plausibility import AXIAL_DEPTH, SPINDLE_SPEED
+from rcsa_ident.plausibility import AXIAL_DEPTH, SEARCHED_DEPTH, SPINDLE_SPEED
 from rcsa_ident.stability.advice import Advice, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.dominance import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
@@ -74,8 +74,9 @@ def advise(
         Cuts that were tried: how many do the limits tell right?
     """
     process, shares, asked = change.process, _Shares(tolerance, probability, reserve), change
-    for name, deep in (("max_depth", change.max_depth), *([] if depth is None else [("depth", depth)])):
-        AXIAL_DEPTH.checked(name, deep)
+    SEARCHED_DEPTH.checked("max_depth", change.max_depth)
+    if depth is not None:
+        AXIAL_DEPTH.checked("depth", depth)
     for i, (speed, at) in enumerate(planned):
         SPINDLE_SPEED.checked(f"planned[{i}] spindle speed", speed)
         AXIAL_DEPTH.checked(f"planned[{i}] axial depth", at)

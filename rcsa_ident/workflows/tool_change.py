@@ -58,7 +58,7 @@ _SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
 #: A machine that changes with speed costs so many further seconds, and so many the modes of a tip.
 _CHANGING_SECONDS, _FIT_SECONDS = 4.0, 1.0
 #: What recommendations are computed by, and at about how many speeds; what the limit of a drawn machine costs of a limit.
-_FITTING, _FITTED_SPEEDS, _DRAWN = FullDiscretisation(), 35, 0.1
+_FITTING, _FITTED_SPEEDS, _DRAWN = FullDiscretisation(), 35, 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,7 +201,8 @@ class ToolChange:
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
         each = float(np.mean(self._seconds_of(_FITTING, self.speeds)))
-        drawn = self.draws * _DRAWN
+        # of what is known exactly none are drawn
+        drawn = 0.0 if self.machine.unknowns == 0 and self.tooling.spread.exact else self.draws * _DRAWN
         if self.recommend:
             found += _FIT_SECONDS + _FITTED_SPEEDS * each * (1.0 + drawn)
         if not zero_order:

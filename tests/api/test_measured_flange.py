@@ -98,7 +98,7 @@ def test_lobes_are_those_of_the_machine_that_was_measured(measured, method):
     asked = {"speeds": SPEEDS | {"step_rpm": 1500}, "cut": CUT, "method": method}
     (own,), (other,) = (client.lobes(machine, "T1", bands=machine == id, **asked).toolings for machine in (id, identified))
     np.testing.assert_allclose(own.limit_depth_mm, other.limit_depth_mm, rtol=1e-6)
-    np.testing.assert_allclose(own.recommended_depth_mm, other.recommended_depth_mm, rtol=1e-6)
+    assert own.recommended_depth_mm == pytest.approx(other.recommended_depth_mm, rel=1e-6)
     assert own.limit_depth_low_mm is None
     assert not any("identification" in w for w in own.warnings)
 

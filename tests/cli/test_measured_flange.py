@@ -80,7 +80,7 @@ def test_lobes_and_advice_are_those_of_the_machine_that_was_measured(tmp_path, r
         for key in ("spindle_speed_rpm", "recommended_depth_mm", "limit_depth_mm", "removal_rate_cm3_per_min", "power_kw", "torque_nm"):
             # through modes that were fitted to either
             assert one[key] == pytest.approx(other[key], rel=2e-3)
-    assert advice[0]["planned"][0]["margin"] == pytest.approx(advice[1]["planned"][0]["margin"], rel=1e-6)
+    assert advice[0]["planned"][0]["margin"] == pytest.approx(advice[1]["planned"][0]["margin"], rel=5e-3)
     assert advice[0]["planned"][0]["probability"] is None
 
 

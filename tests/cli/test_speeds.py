@@ -64,7 +64,7 @@ def test_speeds_beyond_the_campaigns_are_warned_of(tmp_path, softening_file):
 @pytest.mark.slow
 def test_lobes_follow_the_machine_over_its_speeds(tmp_path, softening_file):
     out = tmp_path / "L.csv"
-    run("lobes", softening_file, tmp_path / "T1.toml", "--out", out, *SPEEDS)
+    told = json.loads(run("lobes", softening_file, tmp_path / "T1.toml", "--out", out, *SPEEDS, "--json").stdout)
     curves = read_lobes_csv(out)
     assert list(curves.speed) == [*range(6000, 13001, 500)]
     for rpm in (6000, 9500, 13000):
@@ -72,7 +72,8 @@ def test_lobes_follow_the_machine_over_its_speeds(tmp_path, softening_file):
         alone = read_lobes_csv(out)
         k = list(curves.speed).index(rpm)
         assert curves.limit[k] == pytest.approx(alone.limit[0], rel=1e-9)
-    assert np.all(curves.extra["limit_depth_low_mm"] < curves.extra["limit_depth_high_mm"])
+    for around in told["around"]:
+        assert np.all(np.array(around["limit_depth_low_mm"]) < np.array(around["limit_depth_high_mm"]))
 
 
 @pytest.mark.slow
@@ -101,9 +102,19 @@ def test_a_stiffness_known_less_well_widens_the_bands(tmp_path, result_file):
     result_file.write_text(json.dumps(data), encoding="utf-8")
     widths = []
     for percent in (0, 5):
-        run("lobes", result_file, tmp_path / "T1.toml", "--out", tmp_path / "L.csv", *SPEEDS, "--stiffness-spread", percent)
-        extra = read_lobes_csv(tmp_path / "L.csv").extra
-        widths.append(np.mean(extra["limit_depth_high_mm"] - extra["limit_depth_low_mm"]))
+        command = (
+            "lobes",
+            result_file,
+            tmp_path / "T1.toml",
+            "--out",
+            tmp_path / "L.csv",
+            *SPEEDS,
+            "--stiffness-spread",
+            percent,
+            "--json",
+        )
+        around = json.loads(run(*command).stdout)["around"][0]
+        widths.append(np.mean(np.array(around["limit_depth_high_mm"]) - around["limit_depth_low_mm"]))
     assert widths[1] > 1.5 * widths[0]
 
 

@@ -124,16 +124,16 @@ def test_rubbing_helps_at_low_speed_and_not_at_high_speed():
     assert gain[0] > 2.0
     assert np.all(np.diff(gain) < 0.0)
     assert gain[-1] == pytest.approx(1.0, abs=0.1)
-    # the damping falls as 1 / speed: at a hundred times the speed nothing is left
-    far = np.array([3e6]) * RPM
-    a, b = (stability_lobes(tip(TWO), p, far, 10.0, FULL).limit_depth for p in (bare, worn))
+    # the damping falls as 1 / speed: far above nothing is left
+    far = np.array([5e5]) * RPM
+    a, b = (stability_lobes(tip(TWO), p, far, 5.0, FULL).limit_depth for p in (bare, worn))
     np.testing.assert_allclose(a, b, rtol=2e-2)
 
 
 def test_more_wear_is_more_damping():
     limits = [
         stability_lobes(tip(SKEWED), mill(2, 0.5, damping=ProcessDamping(3e13, w)), np.array([2000.0]) * RPM, 50e-3, FULL).limit_depth[0]
-        for w in (1e-9, 2e-5, 4e-5, 8e-5)
+        for w in (1e-8, 2e-5, 4e-5, 8e-5)
     ]
     none = stability_lobes(tip(SKEWED), mill(2, 0.5), np.array([2000.0]) * RPM, 50e-3, FULL).limit_depth[0]
     assert limits[0] == pytest.approx(none, rel=3e-3)

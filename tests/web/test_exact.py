@@ -54,7 +54,8 @@ def test_limits_come_over_the_preview_until_one_leaves(opened, client: Client, s
         page.goto(f"{served.url}/docs")
     else:
         page.get_by_role("button", name="Stop").click()
-        expect(page.locator(".best")).to_contain_text("No recommended cut has been computed")
+        # the recommended cut does not hang on the lobes beside it
+        expect(page.locator(".best[data-rpm]")).to_be_visible()
         expect(page.locator(".standing")).to_contain_text("Stopped")
         assert sum(page.evaluate(POINTS)) > 0
     assert ended(client, job) == "cancelled"
@@ -69,7 +70,7 @@ def test_the_whole_answer_is_the_services(opened, client: Client, shop: str):
     (wanted,) = client.lobes(shop, "T1", cut=cut, speeds=speeds, method="full-discretisation").toolings
     drawn = page.evaluate("document.querySelector('.chart.lobes .plot').data.find((t) => t.name === 'T1').y")
     assert list(drawn) == pytest.approx([10.0 if depth is None else depth for depth in wanted.limit_depth_mm], rel=1e-12)
-    expect(best).to_have_attribute("data-rpm", f"{wanted.recommended[0].spindle_speed_rpm:g}")
+    expect(best).to_have_attribute("data-rpm", f"{wanted.recommended[0].spindle_speed_rpm:.10g}")
     expect(page.locator(".standing")).to_be_hidden()
     assert page.evaluate(POINTS) == []
 

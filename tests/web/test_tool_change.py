@@ -111,7 +111,7 @@ def test_wrong_tested_cuts_are_refused_in_words(opened, shop: str, tmp_path: Pat
         (head, "found 1 lines, allowed is a line of column names"),
         (head + "8000,1,loud\n", "line 2, column verdict: found loud, allowed is one of stable, chatter, marginal"),
         (head + "\n8000,-1,stable\n", "line 3, column axial_depth_mm: found -1, allowed is a finite number above 0 [mm]"),
-        (head + "133,1,stable\n50,1,stable\n", "cuts[1].spindle_speed_rpm: found 50, allowed is greater than or equal to 100"),
+        (head + "133,1,stable\n5,1,stable\n", "cuts[1].spindle_speed_rpm: found 5, allowed is greater than or equal to 10"),
         (head + "8000,1,stable\n" * 1001, "cuts: found 1001 of them, allowed is at most 1000"),
         (head + "8000\n", "line 2, tested cuts: found 1 cells, allowed is 3 cells as in the header"),
     ):

@@ -83,7 +83,7 @@ export function headline(found, question) {
       further.length
         ? h(
             "p",
-            { class: "soft" },
+            { class: "soft small" },
             "Or ",
             further.map((cut, k) => [
               k ? " and " : "",
@@ -95,7 +95,7 @@ export function headline(found, question) {
             ]),
           )
         : null,
-      heldBack(best, told(found, i).recommended_by),
+      heldBack(best, told(found, i).recommended_by, false),
       bandOf(found, i),
       drawing,
       question.tip ? null : cardLink(lobes.tooling),
@@ -107,7 +107,7 @@ export function headline(found, question) {
 /** What dominates the band of the recommended cut's limit, and what would narrow it. */
 const bandOf = (found, i) => {
   const words = told(found, i).band?.in_words;
-  return words ? h("p", { class: "dominates" }, `${words}.`) : null;
+  return words ? h("p", { class: "small dominates" }, `${words}.`) : null;
 };
 
 /** Say that a recommended cut, which was to come, does not. */
@@ -135,11 +135,11 @@ const unlimited = (cut, question) =>
   );
 
 /** How the recommended depth follows from the stability limit, step by step, and which method computed it. */
-export function heldBack(cut, by) {
+export function heldBack(cut, by, named = true) {
   const steps = cut?.held_back;
   if (!steps || cut.limit_depth_mm === null) return null;
   const chain = [
-    ["stability limit ", q("depth", cut.limit_depth_mm)],
+    [named ? "stability limit " : "Stability limit ", q("depth", cut.limit_depth_mm)],
     [q("depth", steps.within_tolerance_mm), ` within ±${plain(steps.tolerance_percent, 1)} % of the speed`],
     steps.with_probability_mm === null ? null : [q("depth", steps.with_probability_mm), ` with a probability of ${plain(steps.probability_percent, 1)} %`],
     [q("depth", steps.less_reserve_mm), ` less ${plain(steps.reserve_percent, 1)} %`],
@@ -147,7 +147,7 @@ export function heldBack(cut, by) {
   return h(
     "p",
     { class: "soft small held-back" },
-    `At ${plain(cut.spindle_speed_rpm)} rev/min: `,
+    named ? `At ${plain(cut.spindle_speed_rpm)} rev/min: ` : null,
     chain.map((each, k) => [k ? " → " : "", each]),
     by ? `. Computed by ${by}.` : ".",
   );

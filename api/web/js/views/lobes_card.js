@@ -89,11 +89,6 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
     const series = several(found) ? "s6" : SERIES[0];
     lines.push({ name: `${found.coming}, as far as it is known`, series }, { name: `preview by ${first.method}`, series, dash: "dot" });
   }
-  else if (isPreview(first)) {
-    const series = several(found) ? "s6" : SERIES[0];
-    if (by) lines.push({ name: `stability limit by ${by}, with its 95 % band where machines are uncertain`, series });
-    lines.push({ name: `preview by ${first.method}: where to look`, series, dash: "dot" });
-  }
   const box = card(
     method === "zero-order" ? "Stability lobes" : `Stability lobes, ${method}`,
     [choose, csv],
@@ -104,8 +99,10 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
     h(
       "p",
       { class: "small soft" },
-      "The line is the stability limit. Shaded around it: where it lies with a probability of 95 %. Diamonds: the highest ",
-      "limits. Dot: the recommended cut. Hover for limit and chatter frequency; drag to look closer, double click to come back.",
+      isPreview(first)
+        ? `Dotted: a preview by ${first.method}. Solid, around the recommended cuts: the stability limit${by ? ` by ${by}` : ""}. `
+        : "The line is the stability limit. Diamonds: the highest limits. ",
+      "Shaded: where the limit lies with a probability of 95 %. Dot: the recommended cut. Hover for limit and chatter frequency; drag to look closer.",
     ),
     h("div", { class: "reader" }, speed, read),
   );
