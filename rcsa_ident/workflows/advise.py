@@ -273,9 +273,7 @@ def _lost_beside(fitting: Fitting, speed: float, tolerance: float, depths: Seque
         return None
     speeds = speed * np.linspace(1.0 - tolerance, 1.0 + tolerance, _DENSE if tolerance > 0.0 else 1)
     cuts = [min(fitting.cuts, key=lambda known: float(np.min(np.abs(known[0] - at))))[1] for at in speeds.tolist()]
-    for depth in depths:
-        if not np.isfinite(depth) or depth <= 0.0:
-            continue
+    for depth in (cuts[0].process.within_reach(each) for each in depths if each > 0.0):
         grown = np.empty(speeds.size)
         start = None
         for i, (at, cut) in enumerate(zip(speeds.tolist(), cuts, strict=True)):

@@ -111,6 +111,10 @@ def test_advice_is_that_of_the_machine_that_was_measured(measured):
     for one, two in zip(own.highest_removal, other.highest_removal, strict=True):
         numbers, others = one.model_dump(), two.model_dump()
         assert numbers.pop("bound") == others.pop("bound")
+        steps, further = numbers.pop("held_back"), others.pop("held_back")
+        assert steps.pop("in_words")
+        assert further.pop("in_words")
+        assert steps == pytest.approx(further, rel=2e-3)
         # through modes that were fitted to either
         assert numbers == pytest.approx(others, rel=2e-3)
     assert own.common_stable_depth_mm is None
