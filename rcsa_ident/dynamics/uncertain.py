@@ -23,9 +23,6 @@ CHANGE = 0.065
 #: Widest distance of two such nodes, in lines, and how much it grows from line to line.
 WIDEST, GROWTH = 16.0, 0.1
 
-#: In front of the name of a parameter that records have told of.
-IDENTIFIED = "identified "
-
 
 class Doubted(StrEnum):
     """What may not be known well enough; the machine is whatever is none of the others."""
@@ -55,7 +52,7 @@ class Variation:
     unknowns : mapping of Doubted to array, shape (k, p)
         What belongs to each, as k unknowns that move so far along the directions; of what is not named nothing is told.
     parameters : mapping of str to array, shape (k, p)
-        The same, parameter by parameter of a drawing; `IDENTIFIED` in front of those that records have told of.
+        The same, parameter by parameter of a drawing; ``identified`` in front of those that records have told of.
     """
 
     members: tuple[int, ...]

@@ -15,13 +15,14 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling._kernels import changes_of_planes, tip_changes, tips_of_planes, tips_over
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.uncertain import IDENTIFIED, Doubted, Places, UncertainReceptance, Variation
+from rcsa_ident.dynamics.uncertain import Doubted, Places, UncertainReceptance, Variation
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.drawings import FittedDrawing
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_poles
 from rcsa_ident.tool_holder.rods import rod_poles
+from rcsa_ident.tool_holder.spread import IDENTIFIED
 from rcsa_ident.tool_holder.turning import both_planes, entries_at_speed
 
 #: Of a tool-holder's receptances (translation and slope of the tip, then of the flange) those that the tip's translation asks for: tip,

@@ -9,13 +9,12 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from rcsa_ident.dynamics.uncertain import IDENTIFIED
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.plausibility import PlausibilityCode
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
-from rcsa_ident.tool_holder.spread import LENGTHS, Spread
+from rcsa_ident.tool_holder.spread import IDENTIFIED, LENGTHS, Spread
 
 #: Least length of a chuck's body in front of the flange [m].
 _LEAST_BODY = 5e-3

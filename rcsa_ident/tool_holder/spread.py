@@ -69,6 +69,8 @@ class Spread:
 
 
 SPREAD_FIELDS = tuple(each.name for each in fields(Spread) if each.compare)
+#: In front of the name of a parameter that records have told of.
+IDENTIFIED = "identified "
 #: Those that are lengths [m]; the others are shares.
 LENGTHS = ("stickout", "segment_length", "corner_radius")
 #: Largest standard deviations that anybody may believe in.
