@@ -114,6 +114,7 @@ def test_advice_is_that_of_the_machine_that_was_measured(measured):
     for one, two in zip(own.highest_removal, other.highest_removal, strict=True):
         numbers, others = one.model_dump(), two.model_dump()
         assert numbers.pop("bound") == others.pop("bound")
+        assert numbers.pop("why") is others.pop("why") is None
         steps, further = numbers.pop("held_back"), others.pop("held_back")
         assert steps.pop("in_words")
         assert further.pop("in_words")
