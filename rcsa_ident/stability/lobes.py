@@ -34,6 +34,8 @@ DRAWS = 60
 DEEPER = 5.0
 #: Between speeds at which drawn machines are asked by their own period maps, as a share.
 APART = 0.015
+#: Share of a drawn receptance from which on it is said that modes leave so much of it.
+ROUGH_FIT = 0.05
 #: Longest estimated time that one limit may take [s].
 LONGEST_LIMIT = 3600.0
 
@@ -74,7 +76,7 @@ def stability_lobes(
 
     Notes
     -----
-    Drawn machines are asked by the zero-order method where that is the method, else each by its own period map (`own_drawn_limits`).
+    Drawn machines are asked by the zero-order method where that is the method, else each by its own period map (`with_own_draws`).
 
     Examples
     --------
@@ -179,7 +181,7 @@ def _limits(
     if isinstance(method, ZeroOrder):
         return replace(found, drawn=drawn_limits(tip, process, speeds, max_depth, draws, seed))
     modes = fitted_modes(directions_for(process, tip))[0] if modes is None else modes
-    return replace(found, drawn=own_drawn_limits(tip, modes, process, found, draws, seed))
+    return with_own_draws(found, tip, modes, process, draws, seed)
 
 
 def _axial(tip: Receptance | TipModes, process: MillingProcess, found: StabilityLobes) -> str:
@@ -209,19 +211,19 @@ def drawn_limits(
     return _ZERO_ORDER.depths(drawn.omega, drawn.tips, process, speeds, max_depth, drawn.factors)
 
 
-def own_drawn_limits(
-    tip: UncertainReceptance, modes: TipModes, process: MillingProcess, known: StabilityLobes, draws: int = DRAWS, seed: int = 1
-) -> FloatArray:
-    """Return the limits of the same tips by their own period maps, shape (draws, n) [m], infinite beyond the largest depth.
+def with_own_draws(
+    known: StabilityLobes, tip: UncertainReceptance, modes: TipModes, process: MillingProcess, draws: int = DRAWS, seed: int = 1
+) -> StabilityLobes:
+    """Return limits with those of the same drawn tips by their own period maps.
 
     Parameters
     ----------
+    known : StabilityLobes
+        Of the tip itself, by a method that fits the cut.
     tip : UncertainReceptance
     modes : TipModes
         That stand for it.
     process : MillingProcess
-    known : StabilityLobes
-        Of the tip itself, by a method that fits the cut.
     draws, seed : int
 
     Notes
@@ -246,7 +248,8 @@ def own_drawn_limits(
     whole = np.array([limit * np.exp(np.interp(speeds[order], own, each)) for each in ratio])
     limits = np.empty_like(whole)
     limits[:, order] = np.where(whole < deepest * (1.0 - 1e-9), whole, np.inf)
-    return limits
+    rough = f"modes leave up to {100.0 * tips.error:.2g} % of the receptances of drawn machines: the band is as rough as that"
+    return replace(known, drawn=limits, warnings=(*known.warnings, *([rough] if tips.error > ROUGH_FIT else [])))
 
 
 def _telling(speeds: FloatArray, limit: FloatArray) -> NDArray[np.intp]:

@@ -31,8 +31,8 @@ from rcsa_ident.stability.lobes import (
     both_directions,
     directions_for,
     limits_of,
-    own_drawn_limits,
     unusual_speeds,
+    with_own_draws,
 )
 from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.monodromy import MonodromyOperator
@@ -246,7 +246,7 @@ class ToolChange:
             modes = modes_of(tip, process)
             found = _FITTING.lobes(modes, process, speeds[places], self.max_depth)
             if draws > 1 and isinstance(tip, UncertainReceptance) and tip.complete:
-                found = replace(found, drawn=own_drawn_limits(tip, modes, process, found, draws))
+                found = with_own_draws(found, tip, modes, process, draws)
             order.append(places)
             parts.append(found)
             cuts.append((speeds[places], _FITTING.monodromy(modes, process)))
