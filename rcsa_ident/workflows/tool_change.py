@@ -59,6 +59,8 @@ _SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
 _CHANGING_SECONDS, _FIT_SECONDS = 4.0, 1.0
 #: What recommendations are computed by, and at about how many speeds; what the limit of a drawn machine costs of a limit.
 _FITTING, _FITTED_SPEEDS, _DRAWN = FullDiscretisation(), 35, 0.05
+#: Machines that are drawn there at least, and of all of them so many as take about this time at one speed [s].
+_FEWEST, _DRAWN_SECONDS = 20, 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,13 +204,19 @@ class ToolChange:
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
         each = float(np.mean(self._seconds_of(_FITTING, self.speeds)))
         # of what is known exactly none are drawn
-        drawn = 0.0 if self.machine.unknowns == 0 and self.tooling.spread.exact else self.draws * _DRAWN
+        drawn = 0.0 if self.machine.unknowns == 0 and self.tooling.spread.exact else _DRAWN
         if self.recommend:
-            found += _FIT_SECONDS + _FITTED_SPEEDS * each * (1.0 + drawn)
+            found += _FIT_SECONDS + _FITTED_SPEEDS * each * (1.0 + drawn * self.fitting_draws)
         if not zero_order:
             # limits of drawn machines are asked at speeds apart, and at each where the limit turns
-            found += min(speeds.size, np.log(speeds[-1] / speeds[0]) / np.log1p(APART) + 20.0) * each * drawn
+            found += min(speeds.size, np.log(speeds[-1] / speeds[0]) / np.log1p(APART) + 20.0) * each * drawn * self.draws
         return found
+
+    @property
+    def fitting_draws(self) -> int:
+        """How many machines are drawn where cuts are recommended: fewer where each limit takes long, as with teeth that are not alike."""
+        each = float(np.mean(self._seconds_of(_FITTING, self.speeds)))
+        return min(self.draws, max(_FEWEST, int(_DRAWN_SECONDS / each)))
 
     def _seconds_of(self, method: StabilityMethod, speeds: FloatArray) -> FloatArray:
         """About how long a method takes for the limit at each speed [s]."""
@@ -237,7 +245,7 @@ class ToolChange:
 
     def fitting_limits(self, speeds: FloatArray, draws: int | None = None) -> Fitting:
         """Return the limits at rising speeds by the method that fits any cut, each drawn machine's by its own period map."""
-        draws, process = self.draws if draws is None else draws, self.process
+        draws, process = self.fitting_draws if draws is None else draws, self.process
         if isinstance(self.machine, LearntTip):
             # its limits are those of the draws, and their error is that of the method which they were learnt by
             return Fitting(self.machine.limits(process, speeds, self.max_depth, draws), ())
