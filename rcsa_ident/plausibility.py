@@ -228,7 +228,7 @@ TORQUE = Range("N m", 1.0, (0.01, 3000.0), (0.001, 1e6), (("was it given in N mm
 LEAST_SWEEP, LARGEST_SWEEP = 0.005, 2.0
 AXIAL_DEPTH = _length((0.01, 60.0), (1e-4, 500.0))
 #: Up to which limits are looked for: proportions of drawn machines and the windows of a depth look further than the deepest cut.
-SEARCHED_DEPTH = _length((0.01, 60.0), (1e-6, 5000.0))
+SEARCHED_DEPTH = _length((0.01, 60.0), (1e-4, 5000.0))
 
 # -- a tip's modes and recordings --------------------------------------------------------------------------------------------------
 

@@ -392,7 +392,7 @@ class Advice(Drawn):
     >>> print(advice.windows[0])
     13679 to 16000 rev/min, up to 1.60 mm at 14600 rev/min
     >>> print(advice.planned[0])
-    10000 rev/min, 1.00 mm: stable by zero-order, stability limit 1.39 mm, stable with 100 % probability
+    10000 rev/min, 1.00 mm: stable by full-discretisation, stability limit 1.31 mm, stable with 100 % probability
     """
 
     tooling: str

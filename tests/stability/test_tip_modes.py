@@ -121,7 +121,7 @@ def test_modal_tip_resolves_the_sharpest_mode():
 
 
 def test_a_mode_too_sharp_to_resolve_is_refused():
-    model = normal_modes(np.array([5000.0]), np.array([1e-7]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))
+    model = normal_modes(np.array([5000.0]), np.array([1e-6]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))
     with pytest.raises(InputError, match="damping_ratio"):
         TipModes.of({Dof.X: model}).receptance()
 
