@@ -152,7 +152,11 @@ class KnownMachine:
             found[tail + JOINT :, tail + JOINT :] = self.toolings.covariance
         if len(links) == 2:
             x, y = slice(0, sizes[1]), slice(sizes[1], sizes[2])
-            found[x, y] = links[0] @ np.linalg.solve(found[shared, shared], links[1].T)
+            # what is known exactly varies with nothing: no inverse where rounding makes a zero of it
+            size = np.sqrt(np.diag(found[shared, shared]))
+            size[size == 0.0] = 1.0
+            inverse = np.linalg.pinv(found[shared, shared] / np.outer(size, size), hermitian=True)
+            found[x, y] = (links[0] / size) @ inverse @ (links[1] / size).T
             found[y, x] = found[x, y].T
         return found
 
