@@ -266,7 +266,7 @@ def test_the_shape_of_a_cutter_is_kept_and_said(opened, client: Client, shop: st
     expect(asked.locator(".change-results .note.doubt")).to_contain_text("full-discretisation takes unlike teeth")
     told = "computed as a cylinder: the cutter's shape is face; cutting_edge_angle_deg and cutting_depth_mm are not told"
     expect(asked.locator(".change-results .note.doubt")).to_contain_text(told)
-    expect(asked.locator(".reads li")).to_contain_text("no depth recommended")
+    expect(asked.locator(".reads li")).to_contain_text("(95 %: ")
     client.forget_tooling("T1-face")
 
 

@@ -35,7 +35,7 @@ export function doubtCard(keys, fresh) {
   const measured = keys.spread && SPREADS.every(([key]) => keys.spread[key] === 0);
   const known = select(
     [
-      ...(silent ? [["silent", "Not stated: it counts as exact"]] : []),
+      ...(silent ? [["silent", "Not stated (exact)"]] : []),
       ["rough", "Roughly right"],
       ["exact", "Exactly right: measured"],
     ],
