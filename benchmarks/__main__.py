@@ -72,6 +72,7 @@ STUDIES = (
     "fuzz",
     "first_reader",
     "page_outputs",
+    "one_answer",
     "fuzz_api",
     "mutation",
     "physics_pictures",
