@@ -87,6 +87,8 @@ def _python() -> list[Path]:
     # of a checkout that the service is started in, the packages alone: its data may stand beside them
     own = [Path(__file__).parent, Path(rcsa_ident.__file__).parent]
     places = [*sys.path, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values(), "/usr/lib", "/lib", "/lib64", "/usr/share/zoneinfo"]
+    # compiled kernels may lie elsewhere, as in a container
+    places.append(os.environ.get("NUMBA_CACHE_DIR", ""))
     return [*own, *(Path(place) for place in dict.fromkeys(places) if place and Path(place) != Path.cwd() and Path(place).exists())]
 
 

@@ -13,6 +13,7 @@ import textwrap
 
 import pytest
 
+from api import confinement
 from api.confinement import Confinement
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux" or platform.machine() not in ("x86_64", "aarch64"), reason="the kernel's own means")
@@ -104,3 +105,10 @@ def test_nothing_else_is_reached(answer):
     assert len(found) == 14
     reached = {name for name, outcome in found.items() if outcome != "refused"}
     assert reached == (set() if files else reached & FILES)
+
+
+def test_compiled_kernels_that_lie_elsewhere_can_be_read(tmp_path, monkeypatch):
+    """As those of the container do: without them every sound was "a file that cannot be read" there."""
+    assert tmp_path not in confinement._python()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert tmp_path in confinement._python()
