@@ -112,7 +112,7 @@ def told(answer: Any) -> Any:
 def by_service(folder: Path, question: dict[str, Any]) -> dict[str, Cuts]:
     """Return the cuts that the service recommends at once and as a job."""
     store = embedded(folder)
-    with service(store, folder, work_seconds=1000.0) as http:
+    with service(store, folder, work_seconds=1000.0, query_seconds=2000.0) as http:
         client = Client(http=http)
         machine = client.make_machine("m").id
         client.identify(machine, (folder / "RESULT.json").read_text(encoding="utf-8"))
