@@ -81,7 +81,7 @@ def real(folder: Path) -> list[str]:
         for path in sorted(each for each in folder.rglob("*") if part in each.name and each.suffix in (".csv", ".wav", ".mat")):
             opened = open_recording(path, (), 20e3 if path.suffix == ".mat" else None)
             try:
-                quantity, channels = opened.of()
+                quantity, channels, _ = opened.of()
             except InputError:
                 # columns without units: time, acceleration along three axes, another sensor
                 quantity, channels = Quantity.ACCELERATION, opened.channels[1:4]
@@ -121,11 +121,12 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(prog="benchmarks listening", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--files", type=Path, help="folder of real recordings")
     parser.add_argument("--records", type=int, default=FITTED, help="made-up records")
+    parser.add_argument("--first", type=int, default=JUDGING, help="seed of the first of them")
     parser.add_argument("--fit", action="store_true", help="print the weights of the odds instead")
     given = parser.parse_args(arguments)
     if given.fit:
         print(weights(given.records))
         return
-    print("\n".join([*made_up(JUDGING, given.records), "", speeds()]))
+    print("\n".join([*made_up(given.first, given.records), "", speeds()]))
     if given.files is not None:
         print("\n".join(["", *real(given.files)]))
