@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import stat
 import subprocess
@@ -53,6 +54,14 @@ def test_a_setting_that_is_none_is_named(name, value):
 def test_a_mistyped_setting_is_refused_with_its_nearest_name(name, near):
     with pytest.raises(InputError, match=f"^RCSA_IDENT_{name}: found an unknown setting, .*; did you mean RCSA_IDENT_{near}\\?$"):
         from_environment({f"RCSA_IDENT_{name}": "1"})
+
+
+def test_what_the_whole_run_hands_on_is_no_unknown_setting():
+    """A variable of `.ci/run` itself ended every service that a test started."""
+    text = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    names = set(re.findall(r"RCSA_IDENT_[A-Z_]+", text)) - set(re.findall(r"unset (RCSA_IDENT_[A-Z_]+)", text))
+    assert names
+    from_environment(dict.fromkeys(names, "1"))
 
 
 def test_the_database_may_be_told_by_a_file(tmp_path):
