@@ -102,7 +102,7 @@ def by_command(folder: Path, question: dict[str, Any]) -> tuple[dict[str, Cuts],
     return {"lobes": lobes["recommended"], "advise": advice["highest_removal"]}, [console, (folder / "CARD.html").read_text("utf-8")]
 
 
-def told(answer: Any) -> Any:
+def content(answer: Any) -> Any:
     """Return the JSON of an answer that is none of a refusal."""
     if answer.status_code not in (200, 202):
         raise RuntimeError(answer.text)
@@ -124,8 +124,8 @@ def by_service(folder: Path, question: dict[str, Any]) -> dict[str, Cuts]:
             if answer.status_code == 202:
                 # a job, asked for or because it takes long
                 carried(store, folder)
-                return told(http.get(f"/v1/lobes/{told(answer)['id']}"))["answer"]["toolings"][0]
-            return told(answer)["toolings"][0]
+                return content(http.get(f"/v1/lobes/{content(answer)['id']}"))["answer"]["toolings"][0]
+            return content(answer)["toolings"][0]
 
         found = {
             "/v1/lobes": answered("/v1/lobes", asked | {"method": "zero-order"})["recommended"],
