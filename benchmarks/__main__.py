@@ -38,6 +38,7 @@ CLAIMS = (
 STUDIES = (
     "study",
     "identification",
+    "ideals",
     "listening",
     "search_trace",
     "lobes_truth",

@@ -86,8 +86,8 @@ def passive(
     weight, scale, gradient = np.ones((n, outputs), dtype=complex), np.ones(columns), np.empty((columns, 2 * n * outputs))
 
     def kernel() -> np.ndarray:
-        values, kept = cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder)
-        cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, weight, scale, gradient)
+        values, kept, _ = cross_frf(omega_n, shapes, factor, softening, joint, (shares, np.zeros(2)), points, holder)
+        cross_frf_gradient(omega_n, factor, softening, joint, (shares, np.zeros(2)), points, kept, weight, scale, gradient)
         return values
 
     def vectorised() -> np.ndarray:

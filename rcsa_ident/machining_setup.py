@@ -20,7 +20,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, RUNOUT, SPINDLE_SPEED, remarks_of
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
-from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.signals.recording import Recording, Sensor, untold_distances
 from rcsa_ident.tool_holder.catalogue import assumption, stated
 from rcsa_ident.tool_holder.drawings import Drawing
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
@@ -441,10 +441,11 @@ class Campaign(Shown):
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What is unusual about its toolings, its workpiece and its cuts; of cuts that share a remark it names the first."""
+        """What is unusual about its toolings, workpiece, sensors and cuts; of cuts that share a remark it names the first."""
         found = [remark.of(name) for name, tooling in self.toolings.items() for remark in tooling.remarks]
         if self.workpiece is not None:
             found += [remark.of(self.workpiece.name) for remark in self.workpiece.coefficients.remarks]
+        found += untold_distances(self.sensors)
         cuts: dict[Remark, list[str]] = {}
         for cut in self.cuts:
             for remark in cut.remarks:

@@ -48,7 +48,7 @@ def simulate_campaign(
         raise InputError("cuts.toolings", ", ".join(t.name for t in known), "toolings with different names")
     cuts = simulate(setup, toolings, seed, mapper)
     truths = (true_receptances(setup, tooling, speed) for tooling in known for speed in truth_speeds(setup))
-    return write_simulation(out, setup, toolings, cuts, truths, true_flange(setup), progress)
+    return write_simulation(out, setup, toolings, cuts, truths, true_flange(setup), progress, seed)
 
 
 def sample_robot(name: str) -> RobotModel:

@@ -24,6 +24,7 @@ NOUNS = {
     "IdentificationCode": "rcsa_ident.identification.result.IdentificationCode",
     "PlausibilityCode": "rcsa_ident.plausibility.PlausibilityCode",
     "FlangeCode": "rcsa_ident.machine.measured.FlangeCode",
+    "SensorCode": "rcsa_ident.signals.recording.SensorCode",
     "CutterCode": "rcsa_ident.cutting.shape.CutterCode",
     "RobotCode": "rcsa_ident.identification.posed.result.RobotCode",
     "Verdict": "rcsa_ident.signals.verdict.Verdict",

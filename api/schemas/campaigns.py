@@ -75,6 +75,13 @@ class SensorKeys(Body):
     gain_spread_percent: float | None = Field(None, description="Standard deviation of the gain; 2. Counts where drawings are rough.")
     cross_talk_percent: float | None = Field(None, description="Standard deviation of what it feels of the other axis; 1.5.")
     delay_spread_us: float | None = Field(None, description="Standard deviation of its delay; 5.")
+    distance_behind_flange_mm: float | None = Field(
+        None,
+        ge=-100.0,
+        le=300.0,
+        description="How far a displacement sensor looks behind the face between holder and spindle; negative: at the holder.",
+    )
+    distance_spread_mm: float | None = Field(None, ge=0.0, le=100.0, description="Standard deviation of that distance; 1.")
 
     def sensor(self, name: str) -> Sensor:
         """Return the sensor of a channel."""
@@ -90,6 +97,8 @@ class SensorKeys(Body):
             None if self.role is None else Role(self.role),
             self.mount_resonance_hz,
             0.0 if self.rotation_deg is None else math.radians(self.rotation_deg),
+            distance=None if self.distance_behind_flange_mm is None else 1e-3 * self.distance_behind_flange_mm,
+            distance_spread=1e-3 * (1.0 if self.distance_spread_mm is None else self.distance_spread_mm),
         )
 
 

@@ -63,7 +63,7 @@ class JobAnswer(Answer):
     created: str = Field(description="UTC, ISO 8601.")
     started: str | None
     finished: str | None
-    status: Literal["converged", "suspect", "failed"] | None = Field(description="Of a finished identification.")
+    status: Literal["converged", "not validated", "suspect", "failed"] | None = Field(description="Of a finished identification.")
     problem: JobProblem | None
 
 

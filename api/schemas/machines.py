@@ -54,7 +54,7 @@ class MachineContents(Answer):
 class IdentificationSummary(Answer):
     """Summary of an identification."""
 
-    status: str = Field(description="converged, suspect or failed; measured where a flange was measured in place of it")
+    status: str = Field(description="converged, not validated, suspect or failed; measured where a flange was measured in place of it")
     reasons: list[str]
     campaign: str
     axes: list[str]

@@ -35,7 +35,7 @@ class Job:
     progress : str or None
         Stage, done and total, JSON.
     status : str or None
-        Of an identification that is done: converged, suspect or failed.
+        Of an identification that is done: converged, not validated, suspect or failed.
     problem : str or None
         Reason of a failure, JSON.
     started, finished : str or None

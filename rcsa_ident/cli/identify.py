@@ -124,7 +124,7 @@ def identify(
 ) -> None:
     """Find modes and joint of a machine from a campaign of ordinary stable cuts.
 
-    The result is written whatever its status. The exit code is 0 where it has converged, and 3 where it is suspect or has failed:
+    The result is written whatever its status. The exit code is 0 where it has converged or is not validated, else 3, suspect or failed:
     its reasons say why.
     """
     from rcsa_ident.io.files import write_text
@@ -279,7 +279,7 @@ def warn_left_out(data: dict[str, Any]) -> None:
 
 
 def exit_by_status(found: Identification) -> None:
-    """End with exit code 3 unless the answer has converged."""
-    if found.status is not Status.CONVERGED:
+    """End with exit code 3 where something speaks against the answer."""
+    if found.status not in (Status.CONVERGED, Status.NOT_VALIDATED):
         warn(f"the result is {found.status}: " + "; ".join(found.reasons))
         raise typer.Exit(NOT_CONVERGED)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: Columns of a terminal that no cell reaches.
 _WIDEST = 10_000
-_COLOURS = {"converged": "green", "suspect": "yellow", "failed": "red"}
+_COLOURS = {"converged": "green", "not validated": "cyan", "suspect": "yellow", "failed": "red"}
 
 
 def console() -> Console:
@@ -105,6 +105,10 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
         misfit = ", ".join(f"{escape(name)} {value:.2f}" for name, value in part.per_tooling.items())
         name = "" if found.whole is None else f"{axis.upper()}: "
         out.print(f"  {name}chi²/point {part.chi2_per_point:.2f} ({misfit}), unexplained share of a line {100 * part.model_error:.2f} %")
+        predicted = [each for each in found.predictions if each.axis is axis]
+        if predicted:
+            off = ", ".join(f"{escape(p.tooling)} {100 * p.error:.2g} % off ({100 * p.promised:.2g} % promised)" for p in predicted)
+            out.print(f"  {name}predicted by the other toolings: {off}")
         for test in part.tests:
             met = f"met within {100 * test.error:.1f} %, gain {test.gain:.3f} ± {two_digits(test.gain_std)}"
             out.print(f"  hammer test {escape(test.lines.id)}: {test.lines.omega.size} lines, {met}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -364,3 +365,38 @@ def _chip_bounds(j: int, feed: FloatArray, runout: FloatArray) -> tuple[FloatArr
     """Distances a sin(phi) + b of tooth j to the surfaces of the teeth ahead, over one revolution of them: a and b, shape (teeth,)."""
     ahead = (j + np.arange(feed.size)) % feed.size
     return np.cumsum(feed[ahead]), runout[j] - runout[(ahead + 1) % feed.size]
+
+
+def scaled_force(slope: ComplexArray, logs: FloatArray, exact: Mapping[ForceTerm, int]) -> tuple[ComplexArray, ComplexArray]:
+    """Return what forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c).
+
+    Terms that are told in `exact` add up, K_tc e^t (U_1 + k_rc e^r U_2) + K_te e^p U_3 + K_re e^q U_4, with the shares of the sum that
+    their slopes are at the values that were told; the others multiply.
+
+    Parameters
+    ----------
+    slope : complex array, shape (n, c) [-]
+        Change of the simulated force's logarithm with each unknown.
+    logs : array, shape (c,)
+    exact : mapping of ForceTerm to int
+        Places of the terms that add up among the unknowns.
+    """
+    if not exact:
+        return np.exp(slope @ logs), slope
+    places = {term: exact[term] for term in exact if exact[term] < logs.size}
+    rest = logs.copy()
+    rest[list(places.values())] = 0.0
+    nothing = np.zeros(slope.shape[0])
+    share = {term: slope[:, k] for term, k in places.items()}
+    grown = {term: np.exp(logs[k]) for term, k in places.items()}
+    edges = [term for term in (ForceTerm.TANGENTIAL_EDGE, ForceTerm.RADIAL_EDGE) if term in places]
+    chip = share.get(ForceTerm.TANGENTIAL, 1.0 - sum((share[term] for term in edges), nothing))
+    ratio, tangential = share.get(ForceTerm.RATIO, nothing), grown.get(ForceTerm.TANGENTIAL, 1.0)
+    radial = tangential * ratio * grown.get(ForceTerm.RATIO, 1.0)
+    parts = {ForceTerm.TANGENTIAL: tangential * (chip - ratio) + radial, ForceTerm.RATIO: radial}
+    parts |= {term: share[term] * grown[term] for term in edges}
+    total = parts[ForceTerm.TANGENTIAL] + sum((parts[term] for term in edges), 1.0 - chip - sum((share[term] for term in edges), nothing))
+    moved = slope.copy()
+    for term, k in places.items():
+        moved[:, k] = parts[term] / total
+    return total * np.exp(slope @ rest), moved

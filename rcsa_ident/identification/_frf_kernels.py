@@ -14,12 +14,13 @@ BLOCK = 128
 
 
 @numba.njit(cache=True, error_model="numpy")
-def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder):
-    """Return motion per tip force, shape (n, o), and what `cross_frf_gradient` needs of the way there.
+def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder):
+    """Return motion per tip force, shape (n, o), what `cross_frf_gradient` needs of the way there, and the slope that the flange's
+    sensor sees, shape (n,).
 
     B = psi^T (K - w^2 + i w factor factor^T)^-1 psi + R, K_ij = omega_i omega_j (delta_ij + x softening_ij);
     output b (a row: the flange's own, or another place's, or what `shares` makes of them) answers g = b x with
-    x = (A22 + K_joint^-1 + B)^-1 A21 e0.
+    x = (A22 + K_joint^-1 + B)^-1 A21 e0. The flange's own row is [1 d] B, or on the holder's side of the joint [1 d] (B + K_joint^-1).
     A point of the tool-holder answers c + b x with b = -A_p2 and c its direct receptance, the machine's motion not being its own.
 
     Parameters
@@ -29,7 +30,8 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder)
         triangular factor of R, of other places to the flange's t and r, as it is
     softening : (m, m) symmetric, or (0, 0) where nothing changes with speed
     joint : (4,) k_t, k_r, c_t, c_r, or (6,) with the shares by which natural frequencies and damping differ where the spindle stands still
-    shares : (o, 1 + e) what of the flange's motion and of the other places' is in each output
+    sensors : shares (o, 1 + e), what of the flange's motion and of the other places' is in each output; and (2,) of the flange's sensor its
+        distance d behind the joint, and 1 where it looks at the holder, else 0
     points : (n, 4) omega, x, 1 for motions of the machine and 0 for those of the tool-holder, 1 where the spindle stands still
     holder : (n, 8) A22 tt, tr, rr, A21 e0 t, r, c and b of a point of the tool-holder (zeros for the machine's)
 
@@ -37,8 +39,10 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder)
     of x and of y = (A22 + K_joint^-1 + B)^-1 b^T of each output.
     """
     m, n = omega_n.size, points.shape[0]
+    shares, seen = sensors
     outputs, sides = shares.shape[0], 1 + shares.shape[1]
-    values = np.empty((n, outputs), dtype=np.complex128)
+    values, turned = np.empty((n, outputs), dtype=np.complex128), np.empty(n, dtype=np.complex128)
+    behind, front = seen
     kept = np.empty(((n + BLOCK - 1) // BLOCK, m * sides + 2 + 2 * outputs, 2, BLOCK))
     psi, residual = shapes[:m], shapes[m:].T
     soft = softening.shape[0] > 0
@@ -91,18 +95,22 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder)
             w, own = points[first + f, 0], points[first + f, 2]
             here = holder[first + f]
             b_tt, b_tr, b_rr = _at(machine[0, 0], f), _at(machine[0, 1], f), _at(machine[1, 1], f)
-            e_tt = here[0] + _reciprocal(complex(joint[0], w * joint[2])) + b_tt
+            gives_t, gives_r = _reciprocal(complex(joint[0], w * joint[2])), _reciprocal(complex(joint[1], w * joint[3]))
+            e_tt = here[0] + gives_t + b_tt
             e_tr = here[1] + b_tr
-            e_rr = here[2] + _reciprocal(complex(joint[1], w * joint[3])) + b_rr
+            e_rr = here[2] + gives_r + b_rr
             inverse = _reciprocal(e_tt * e_rr - e_tr * e_tr)
             x0 = (e_rr * here[3] - e_tr * here[4]) * inverse
             x1 = (e_tt * here[4] - e_tr * here[3]) * inverse
             row = m * sides
             _put(kept[block, row], f, x0)
             _put(kept[block, row + 1], f, x1)
+            r_r = b_rr + front * gives_r
+            turned[first + f] = own * (b_tr * x0 + r_r * x1)
+            f_t, f_r = b_tt + front * gives_t + behind * b_tr, b_tr + behind * r_r
             for o in range(outputs):
                 flange = own * shares[o, 0]
-                b_t, b_r = flange * b_tt, flange * b_tr
+                b_t, b_r = flange * f_t, flange * f_r
                 for a in range(2, sides):
                     b_t += own * shares[o, a - 1] * _at(machine[a, 0], f)
                     b_r += own * shares[o, a - 1] * _at(machine[a, 1], f)
@@ -115,11 +123,11 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder)
                 row += 2
                 _put(kept[block, row], f, (e_rr * b_t - e_tr * b_r) * inverse)
                 _put(kept[block, row + 1], f, (e_tt * b_r - e_tr * b_t) * inverse)
-    return values, kept
+    return values, kept, turned
 
 
 @numba.njit(cache=True, error_model="numpy")
-def cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, weight, scale, out):
+def cross_frf_gradient(omega_n, factor, softening, joint, sensors, points, kept, weight, scale, out):
     """Fill `out` (q, 2 n o) with the change of all lines with each unknown: real parts, then imaginary parts.
 
     dg = db x - y^T (dB + dK_joint^-1) x of `cross_frf`; with p = (K - w^2 + i w factor factor^T)^-1 psi v and q likewise of x,
@@ -128,7 +136,7 @@ def cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, 
 
     Parameters
     ----------
-    omega_n, factor, softening, joint, shares, points : as in `cross_frf`; kept : what it has kept
+    omega_n, factor, softening, joint, sensors, points : as in `cross_frf`; kept : what it has kept
     weight : (n, o) complex, by which each line's change is multiplied
     scale : (q,) by which that with each unknown is
 
@@ -138,6 +146,7 @@ def cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, 
     tool-holder are the tip: b = -A21 e0 changes with the latter two.
     """
     m, n = omega_n.size, points.shape[0]
+    shares, seen = sensors
     outputs, sides = shares.shape[0], 1 + shares.shape[1]
     pairs = m * (m + 1) // 2
     soft, stills = softening.shape[0] > 0, joint.size == 6
@@ -168,7 +177,16 @@ def cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, 
         for o in range(outputs):
             start = first * outputs + o
             _output_rows(
-                here[m * sides + 2 + 2 * o :], shares[o], points[first:], weight[first:, o], 1.0 if o == 0 else 0.0, size, v, y, moved, away
+                here[m * sides + 2 + 2 * o :],
+                shares[o],
+                seen[0],
+                points[first:],
+                weight[first:, o],
+                1.0 if o == 0 else 0.0,
+                size,
+                (v, y),
+                moved,
+                away,
             )
             for i in range(m):
                 _products(here[i * sides], v[0], here[i * sides + 1], v[1], 1.0, p[i, 0], p[i, 1], size)
@@ -211,12 +229,16 @@ def cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, 
                         share = -omega_n[i] * omega_n[j] * scale[k] * (0.5 if i == j else 1.0)
                         _line(kp[i], q[j], kp[j], q[i], share, out[k], start, outputs, spare, size)
                         k += 1
-            _products(y[0], x0, none, x0, 1.0, sums[0, 0], sums[0, 1], size)
-            _products(y[1], x1, none, x1, 1.0, sums[1, 0], sums[1, 1], size)
+            # what moves with the holder moves with the joint's own flexibility, too
+            felt, sign = (v, -1.0) if seen[1] == 1.0 else (y, 1.0)
+            _products(felt[0], x0, none, x0, sign, sums[0, 0], sums[0, 1], size)
+            _products(felt[1], x1, none, x1, sign, sums[1, 0], sums[1, 1], size)
             for a in range(4):
                 _line(sums[a % 2], flexible[a], none, x0, scale[k], out[k], start, outputs, spare, size)
                 k += 1
             if k < out.shape[0]:
+                _products(y[0], x0, none, x0, 1.0, sums[0, 0], sums[0, 1], size)
+                _products(y[1], x1, none, x1, 1.0, sums[1, 0], sums[1, 1], size)
                 _line(sums[0], unit, none, x0, -1.0, out[k], start, outputs, spare, size)
                 _line(y[0], x1, y[1], x0, -1.0, out[k + 1], start, outputs, spare, size)
                 _line(sums[1], unit, none, x0, -1.0, out[k + 2], start, outputs, spare, size)
@@ -366,16 +388,17 @@ def _speed_rows(points, joint, first, size, turn, soften, stiffer):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _output_rows(kept, shares, points, weight, direct, size, v, y, moved, away):
-    """An output's y and v, its shares of the other places and minus that of the tool-holder's own point, which is the first output's
+def _output_rows(kept, shares, behind, points, weight, direct, size, answers, moved, away):
+    """An output's v and y, its shares of the other places and minus that of the tool-holder's own point, which is the first output's
     alone, times the lines' weights.
     """
+    v, y = answers
     for f in range(size):
         own, by = points[f, 2], weight[f]
         for a in range(2):
             answer = _at(kept[a], f) * by
             _put(y[a], f, answer)
-            _put(v[a], f, own * shares[0] * by - answer if a == 0 else -answer)
+            _put(v[a], f, own * shares[0] * (1.0 if a == 0 else behind) * by - answer)
         for e in range(moved.shape[0]):
             _put(moved[e], f, own * shares[1 + e] * by)
         _put(away, f, direct * (own - 1.0) * by)

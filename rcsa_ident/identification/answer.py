@@ -13,12 +13,13 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.force_directions import WORTH, gain_across, turned
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.causes import Causes, causes
 from rcsa_ident.identification.coupled.data import CoupledData
 from rcsa_ident.identification.coupled.parameters import CoupledLayout
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.identification.coupled.score import Coupling
 from rcsa_ident.identification.data import LEVER, IdentificationData
-from rcsa_ident.identification.diagnostics import deviation_of_tip, diagnose, remarks, two_solutions
+from rcsa_ident.identification.diagnostics import because, deviation_of_tip, diagnose, not_as_predicted, remarks, two_solutions
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
@@ -27,6 +28,7 @@ from rcsa_ident.identification.parameters import Layout, parameter_names, planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, MetTest, Standstill
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.validation import Prediction, predictions, validated, widening
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
 from rcsa_ident.tool_holder.drawings import KnownToolings
@@ -47,6 +49,12 @@ MOSTLY_PASSES = (
 )
 HOUSING_LEFT_OUT = (
     "X and Y feel each other, and both together are fitted to the flange's motion alone: the accelerometers on the housing were not used"
+)
+#: Toolings that contradict each other where the flange's sensors look elsewhere than at the flange.
+ENOUGH_FOR_DISTANCE = 3
+DISTANCE_UNTOLD = (
+    "nobody has told how far behind the flange the sensors look: 15 mm make tips in another holder wrong by 2 to 6 %, and two toolings do "
+    "not show it; measure distance_behind_flange_mm with a ruler"
 )
 #: Said of a campaign whose cuts push the tool in like directions.
 ANOTHER_FEED = "all cuts push the tool in like directions: cuts fed along Y beside those along X would about halve the uncertainty"
@@ -99,8 +107,23 @@ class Fit(ABC):
         return evidence(self.solution, self.misfit)
 
     @cached_property
+    def causes(self) -> Causes:
+        """What may stand behind what the model leaves unexplained."""
+        return causes(self.solution, self.misfit, self.wider)
+
+    @cached_property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """How the lines of each tooling are predicted by the other ones."""
+        return predictions(self.solution, self.misfit, self.wider)
+
+    @cached_property
     def covariance(self) -> FloatArray:
-        """Covariance of all unknowns, shape (p, p)."""
+        """Covariance of all unknowns, shape (p, p): wider where a cause acts that is not in the model, or a prediction fails."""
+        return self.causes.mixed(self.of_the_noise) * widening(self.predictions) ** 2
+
+    @cached_property
+    def of_the_noise(self) -> FloatArray:
+        """The same where the model holds, shape (p, p)."""
         found = self.wider**2 * np.linalg.inv(self.solution.evaluation.hessian)
         return 0.5 * (found + found.T)
 
@@ -117,20 +140,24 @@ class Fit(ABC):
         evaluation, force = solution.evaluation, solution.layout.force
         assert evaluation.linear is not None
         reasons, notes = self.doubts()
+        reasons = [*because(self.causes), *reasons, *not_as_predicted(self.predictions)]
+        if not data.distance_told and len(data.toolings) < ENOUGH_FOR_DISTANCE:
+            notes = [Remark(IdentificationCode.DISTANCE_UNTOLD, DISTANCE_UNTOLD), *notes]
         if 2 * data.swept_cuts > data.cuts:
             reasons = [*reasons, Remark(IdentificationCode.MOSTLY_PASSES, MOSTLY_PASSES)]
         # wider bands do not make less known than was known before
         known = np.minimum(np.sqrt(np.diag(self.covariance)[force]), misfit.data.coefficient_spread)
         scales = zip(solution.theta[force].tolist(), known.tolist(), strict=True)
         return Identification(
-            status=Status.SUSPECT if reasons else Status.CONVERGED,
+            status=Status.SUSPECT if reasons else Status.CONVERGED if self._validated else Status.NOT_VALIDATED,
             reasons=tuple(reasons),
             seed=seed,
             method=method,
+            predictions=self.predictions,
             **self.machines(),
             cut_ids=data.cut_ids[: data.cuts],
             delay=evaluation.nuisance[: data.cuts, 0],
-            delay_std=evaluation.linear.delay_std(self.covariance)[: data.cuts],
+            delay_std=evaluation.linear.delay_std(self.of_the_noise)[: data.cuts],
             spindle_speed=data.spindle_speed[: data.cuts],
             trace=(),
             notes=tuple(notes),
@@ -138,6 +165,11 @@ class Fit(ABC):
             coefficients=dict(zip(data.coefficients, scales, strict=False)),
             toolings=self._toolings(),
         )
+
+    @property
+    def _validated(self) -> bool:
+        """Whether the toolings predict each other, and could not do so with sensors that look elsewhere: two always find modes for that."""
+        return validated(self.predictions) and (self.data.distance_told or len(self.data.toolings) >= ENOUGH_FOR_DISTANCE)
 
     def _gain(self, k: int) -> tuple[float, float]:
         """Value and standard deviation of the gain of a hammer test, as a logarithm."""
@@ -234,18 +266,21 @@ class PlaneFit(Fit):
     @cached_property
     def posteriors(self) -> list[Posterior]:
         """What is known of each axis and of the joint."""
+        return self._posteriors(self.covariance)
+
+    def _posteriors(self, whole: FloatArray) -> list[Posterior]:
         layout, others = planes(self.solution.layout), planes(self.rival.layout)
         found = []
         for i in range(len(self.data.axes)):
             entries = _entries(layout, i)
             own, other = replace(layout.axes[i], places=0, standstill=False), self.rival.theta[_entries(others, i)]
-            covariance = self.covariance[np.ix_(entries, entries)]
+            covariance = whole[np.ix_(entries, entries)]
             toolings = {}
             if self.data.rough is not None:
                 rough = self._rough_entries(self.solution)
                 toolings = {
-                    "tooling_cross": self.covariance[np.ix_(entries, rough)],
-                    "tooling_covariance": self.covariance[np.ix_(rough, rough)],
+                    "tooling_cross": whole[np.ix_(entries, rough)],
+                    "tooling_covariance": whole[np.ix_(rough, rough)],
                     "rival_toolings": (self.rival.theta[self._rough_entries(self.rival)] - self.rough_values,),
                 }
             found.append(Posterior(self.solution.theta[entries], covariance, own, self.data.speed_range, (other,), **toolings))
@@ -254,10 +289,12 @@ class PlaneFit(Fit):
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
         """Return the reasons for `suspect` and the notes."""
         data = self.data
-        bands = [deviation_of_tip(posterior, axis) for posterior, axis in zip(self.posteriors, data.axes, strict=True)]
+        # further or quieter cuts help against noise alone
+        known = self._posteriors(self.of_the_noise)
+        bands = [deviation_of_tip(posterior, axis) for posterior, axis in zip(known, data.axes, strict=True)]
         reasons = diagnose(data, self.solution, self.misfit, bands, two_solutions(data, self.searched))
-        known = zip(data.axes, self.posteriors, strict=True)
-        natural = {str(axis.axis).upper(): posterior.machine(axis.axis)[0].omega_n for axis, posterior in known}
+        pairs = zip(data.axes, self.posteriors, strict=True)
+        natural = {str(axis.axis).upper(): posterior.machine(axis.axis)[0].omega_n for axis, posterior in pairs}
         found = remarks(data, self.solution, self.misfit, self.covariance, natural)
         if (data.tests or not data.of_flange) and len(data.axes) > 1:
             found.append(Remark(IdentificationCode.PLANES_NOT_ASKED, PLANES_NOT_ASKED))
@@ -308,15 +345,16 @@ class CoupledFit(Fit):
     @cached_property
     def posterior(self) -> CoupledPosterior:
         """What is known of both planes and of the joint."""
+        return self._posterior(self.covariance)
+
+    def _posterior(self, whole: FloatArray) -> CoupledPosterior:
         layout = _coupled(self.solution)
         entries = np.r_[layout.machine, layout.joint]
-        return CoupledPosterior(
-            _unknowns(self.solution), self.covariance[np.ix_(entries, entries)], self.data.speed_range, (_unknowns(self.rival),)
-        )
+        return CoupledPosterior(_unknowns(self.solution), whole[np.ix_(entries, entries)], self.data.speed_range, (_unknowns(self.rival),))
 
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
         """Return the reasons for `suspect` and the notes, first of them how much the planes feel each other."""
-        value, changes = self.posterior.part(None).response(self._contribution)
+        value, changes = self._posterior(self.of_the_noise).part(None).response(self._contribution)
         assert changes is not None
         bands = [float(np.linalg.norm(changes[:, :, i, i]) / max(float(np.linalg.norm(value[:, i, i])), 1e-300)) for i in range(2)]
         reasons = diagnose(self.data, self.solution, self.misfit, bands)

@@ -101,6 +101,7 @@ def prepare(
                     [_slopes(each.force_slope, uncertain, toolings.index(m.tooling), len(coefficients)) for _, m, each in present]
                 ),
                 shares=lines[0].output_shares,
+                behind=0.0,
                 **({"sweep": np.concatenate(sweeps), "around": np.concatenate(beside)} if sweeping else {}),
                 **_both_forces([(each, toolings.index(m.tooling)) for _, m, each in present], uncertain, len(coefficients)),
             )

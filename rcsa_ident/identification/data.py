@@ -77,6 +77,8 @@ class AxisData:
     shares : array, shape (o, 1 + e) or (0, 0) [-]
         What of the flange's motion, and of that of other places of the machine, is in each output. The first output, or the first two, is
         what a search looks for: the flange's motion, or where no sensor sees that, another place's.
+    behind : float [-]
+        How far behind the joint the flange's sensor looks, over the lever; negative: at the holder.
     """
 
     axis: Dof
@@ -99,6 +101,7 @@ class AxisData:
     around: ComplexArray = field(default_factory=lambda: np.zeros((0, 2, 5), dtype=complex))
     talk: ComplexArray = field(default_factory=lambda: np.zeros((0, 0, 0), dtype=complex))
     shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    behind: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("omega", "order", "variance", "beside", "sweep", "shares"):
@@ -193,7 +196,7 @@ class AxisData:
 
     def of(self, keep: np.ndarray) -> AxisData:
         """Return some of the points: a mask or indices, shape (n,)."""
-        whole = (each.name for each in fields(self) if each.name not in ("axis", "shares"))
+        whole = (each.name for each in fields(self) if each.name not in ("axis", "shares", "behind"))
         return replace(self, **{name: getattr(self, name)[keep] for name in whole if len(getattr(self, name))})
 
 
@@ -276,6 +279,10 @@ class IdentificationData:
         Standard deviation of the stiffness' change from the middle to the end of the speeds; None where nobody told any.
     talk_place : mapping of Dof to int
         Where the share that an axis' sensor feels of the other axis' motion stands among the coefficients.
+    distance_place : mapping of Dof to int
+        Where what is not known of an axis' `behind` stands among them.
+    distance_told : bool
+        Whether somebody has told where the flange's sensors look.
     rough : RoughToolings or None
         What drawings do not tell; unknowns in units of their spreads, behind the gains and in front of the smooth errors.
     rough_holders : tuple of RoughToolHolder
@@ -300,6 +307,8 @@ class IdentificationData:
     tests: tuple[HammerLines, ...] = ()
     softening_spread: float | None = None
     talk_place: Mapping[Dof, int] = field(default_factory=dict)
+    distance_place: Mapping[Dof, int] = field(default_factory=dict)
+    distance_told: bool = True
     rough: RoughToolings | None = None
     rough_holders: tuple[RoughToolHolder, ...] = ()
     rough_first: int = 0

@@ -12,6 +12,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.answer import CoupledFit, Fit, PlaneFit
 from rcsa_ident.identification.candidate import Candidate
+from rcsa_ident.identification.causes import with_orders
 from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupled_data
 from rcsa_ident.identification.coupled.fit import coupled_starts, fit_coupled
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
@@ -216,7 +217,7 @@ class EvidenceSelection:
             felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
             if felt.score > PLAIN:
                 together = self._together(data, points, felt, searched, apart.candidate, misfit, map, report)
-                if together.evidence < evidence(apart, misfit) - PLAIN_GAIN:
+                if together.evidence < min(evidence(apart, misfit) - PLAIN_GAIN, with_orders(apart, misfit)):
                     return together
         apart, misfit = fit_jointly(smooth, self.priors, searched, first, report)
         if data.sweeps:
@@ -226,7 +227,8 @@ class EvidenceSelection:
             felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
             if felt.score > STRIKES:
                 together = self._together(data, points, felt, searched, apart.candidate, misfit, map, report)
-        if together is not None and together.evidence < evidence(grown[0], grown[1]):
+        # forces that are wrong in each order of the teeth look like planes that feel each other: they are asked first
+        if together is not None and together.evidence < with_orders(*grown[:2]):
             return together
         return PlaneFit(data, searched, *grown)
 

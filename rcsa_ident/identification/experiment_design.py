@@ -366,12 +366,13 @@ def _cross(
         raise InputError("layout", "a layout with other places' motion", "one of the flange's motion alone, as a posterior has")
     axis, joint = unpack(theta[:-JOINT], layout), scaled_joint(theta[-JOINT:])
     n, one = points.shape[0], np.ones((1, 1))
-    values, kept = cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, joint, one, points, holder)
+    here = np.zeros(2)
+    values, kept, _ = cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, joint, (one, here), points, holder)
     rows = np.empty((theta.size, 2 * n if slopes else 0))
     if slopes:
         # the kernel's joint is in units of itself, its logarithm is the unknown
         scale, weight = np.concatenate([chain(axis, layout), joint]), np.ones((n, 1), dtype=complex)
-        cross_frf_gradient(axis.omega_n, axis.factor, axis.softening, joint, one, points, kept, weight, scale, rows)
+        cross_frf_gradient(axis.omega_n, axis.factor, axis.softening, joint, (one, here), points, kept, weight, scale, rows)
     columns, core = (rows[:, : rows.shape[1] // 2] + 1j * rows[:, rows.shape[1] // 2 :]).T, layout.core
     columns[:, core - 3 : core] = columns[:, core - 3 : core] @ residual_turn(axis.residual)
     return values[:, 0], columns

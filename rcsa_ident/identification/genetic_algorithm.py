@@ -1,7 +1,8 @@
 """The published identification: a genetic algorithm over boxes, with its printed search space and cost ([inprocess], Table 2, eq. 14).
 
 64 variables a direction: ten complex modes (p1..p6) and the joint (p7..p10). What [inprocess] does not say is how the simulated
-force's phase is tied to the record; here each cut is granted its best delay on a grid, for every candidate.
+force's phase is tied to the record; here each cut is granted its best delay on a grid, for every candidate. As there, sensors are taken to
+look at the flange itself: how far behind it they look is not asked.
 """
 
 from __future__ import annotations

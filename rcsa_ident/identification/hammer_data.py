@@ -187,6 +187,7 @@ def _joined(parts: Sequence[AxisData]) -> AxisData:
         on_holder=whole(lambda p: p.on_holder if p.on_holder.size else np.zeros(p.omega.size, dtype=bool)),
         still=whole(lambda p: p.still if p.still.size else np.zeros(p.omega.size, dtype=bool)),
         point=whole(lambda p: p.point if p.point.size else np.zeros((p.omega.size, 3))),
+        behind=parts[0].behind,
         **_cuts_alone(parts),
         **_swept(parts),
     )

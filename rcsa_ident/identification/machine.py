@@ -186,7 +186,8 @@ class IdentifiedMachine(Machine):
     @property
     def remarks(self) -> tuple[str, ...]:
         """What speaks against everything that is computed with it."""
-        doubts = () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
+        fine = self.status in (Status.CONVERGED, Status.NOT_VALIDATED)
+        doubts = () if fine else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
         words = "" if self.workpiece_side is None else self.workpiece_side.words
         along = () if self.axial is None else self.axial.remarks(self.band)
         return (*doubts, *([words] if words else []), *along)

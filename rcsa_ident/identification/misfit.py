@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.force import ForceTerm
+from rcsa_ident.cutting.force import ForceTerm, scaled_force
 from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
 from rcsa_ident.identification._kernels import fit_cuts, force_rows, mix_cuts, turn_lines
 from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
@@ -107,6 +107,10 @@ class Misfit:
         self._talk = tuple(data.talk_place.get(a.axis) for a in data.axes)
         self._lines = self._in_order(tuple(a.lines for a in self._axes))
 
+    def with_cut_weight(self, weight: FloatArray) -> Misfit:
+        """Return the misfit of the same data with other factors on the weights of the cuts' lines, shape (k,)."""
+        return Misfit(self.data, self.priors, self.model_error, weight)
+
     @property
     def points(self) -> int:
         """Number of real residuals of the lines."""
@@ -203,13 +207,27 @@ class Misfit:
             axis = unpack(theta[layout.axis(i)], part)
             both = np.append(joint, axis.standstill)
             holder = lines.with_toolings(toolings[i]) if toolings else lines.holder
-            values, kept = cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, both, lines.shares, lines.points, holder)
+            seen = self.seen_at(i, theta, layout)
+            machine = axis.omega_n, axis.shapes, axis.factor, axis.softening, both
+            values, kept, turned = cross_frf(*machine, (lines.shares, seen), lines.points, holder)
             factor, slope = lines.drawn_force, lines.force_slope[:, :0]
             if layout.coefficients:
                 factor, slope = lines.force(theta[layout.force])
                 values *= factor[:, None]
-            answers.append(_AxisAnswer(values, kept, factor, slope, axis, part, both, toolings[i] if toolings else []))
+            felt = _Felt(seen, turned, self.distance_place(i, layout))
+            answers.append(_AxisAnswer(values, kept, factor, slope, axis, part, both, toolings[i] if toolings else [], felt))
         return answers
+
+    def seen_at(self, i: int, theta: FloatArray, layout: Unknowns) -> FloatArray:
+        """Return how far behind the joint an axis' flange sensor looks, over the lever, and 1 where it looks at the holder, shape (2,)."""
+        told, place = self.data.axes[i].behind, self.distance_place(i, layout)
+        more = 0.0 if place is None else float(theta[layout.force][place])
+        return np.array([told + more, float(told < 0.0)])
+
+    def distance_place(self, i: int, layout: Unknowns) -> int | None:
+        """Return where what is not known of that distance stands among a layout's coefficients; None where it does not."""
+        place = self.data.distance_place.get(self.data.axes[i].axis)
+        return None if place is None or place >= layout.coefficients else place
 
     def _with_slopes(self, answers: Sequence[Answer], theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
         """The answers, ready to be linearised."""
@@ -381,41 +399,6 @@ class WeightedLines:
         return scaled_force(self.force_slope[:, : logs.size], logs, self.exact)
 
 
-def scaled_force(slope: ComplexArray, logs: FloatArray, exact: Mapping[ForceTerm, int]) -> tuple[ComplexArray, ComplexArray]:
-    """Return what forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c).
-
-    Terms that are told in `exact` add up, K_tc e^t (U_1 + k_rc e^r U_2) + K_te e^p U_3 + K_re e^q U_4, with the shares of the sum that
-    their slopes are at the values that were told; the others multiply.
-
-    Parameters
-    ----------
-    slope : complex array, shape (n, c) [-]
-        Change of the simulated force's logarithm with each unknown.
-    logs : array, shape (c,)
-    exact : mapping of ForceTerm to int
-        Places of the terms that add up among the unknowns.
-    """
-    if not exact:
-        return np.exp(slope @ logs), slope
-    places = {term: exact[term] for term in exact if exact[term] < logs.size}
-    rest = logs.copy()
-    rest[list(places.values())] = 0.0
-    nothing = np.zeros(slope.shape[0])
-    share = {term: slope[:, k] for term, k in places.items()}
-    grown = {term: np.exp(logs[k]) for term, k in places.items()}
-    edges = [term for term in (ForceTerm.TANGENTIAL_EDGE, ForceTerm.RADIAL_EDGE) if term in places]
-    chip = share.get(ForceTerm.TANGENTIAL, 1.0 - sum((share[term] for term in edges), nothing))
-    ratio, tangential = share.get(ForceTerm.RATIO, nothing), grown.get(ForceTerm.TANGENTIAL, 1.0)
-    radial = tangential * ratio * grown.get(ForceTerm.RATIO, 1.0)
-    parts = {ForceTerm.TANGENTIAL: tangential * (chip - ratio) + radial, ForceTerm.RATIO: radial}
-    parts |= {term: share[term] * grown[term] for term in edges}
-    total = parts[ForceTerm.TANGENTIAL] + sum((parts[term] for term in edges), 1.0 - chip - sum((share[term] for term in edges), nothing))
-    moved = slope.copy()
-    for term, k in places.items():
-        moved[:, k] = parts[term] / total
-    return total * np.exp(slope @ rest), moved
-
-
 class Answer(Protocol):
     """What a model says of one axis' lines: `model`, shape (n, o) [m/N]."""
 
@@ -431,6 +414,15 @@ class Answer(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Felt:
+    """Where an axis' flange sensor looks, the slope there at each point, and the unknown's place among the coefficients."""
+
+    seen: FloatArray
+    turned: ComplexArray
+    place: int | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _AxisAnswer:
     """One bending plane's lines, what their gradient is made of, and the physics behind them."""
 
@@ -442,6 +434,7 @@ class _AxisAnswer:
     layout: AxisLayout
     joint: FloatArray
     toolings: Sequence[ToolingAt]
+    felt: _Felt
 
     def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
         axis, bare = self.axis, slice(self.layout.core - 3, self.layout.core)
@@ -453,13 +446,15 @@ class _AxisAnswer:
         root = -lines.root.reshape(n, o)
         out = np.empty((own + max(forces, holder), 2 * n * o))
         rows, weight = out[: own + holder], root * self.factor[:, None]
-        cross_frf_gradient(
-            axis.omega_n, axis.factor, axis.softening, self.joint, lines.shares, lines.points, self.kept, weight, scale, rows
-        )
+        machine = axis.omega_n, axis.factor, axis.softening, self.joint
+        cross_frf_gradient(*machine, (lines.shares, self.felt.seen), lines.points, self.kept, weight, scale, rows)
         compliance = _complex(out[bare])
         out[bare] = (RESIDUAL_UNIT * residual_turn(axis.residual)).T @ out[bare]
         with_holder = _complex(out[own : own + holder])
         force_rows(self.slope, root * self.model, out[own : own + forces])
+        if self.felt.place is not None:
+            change = (weight * lines.shares[:, 0] * self.felt.turned[:, None]).ravel()
+            out[own + self.felt.place] = np.concatenate([change.real, change.imag])
         for each in self.toolings:
             moved = with_holder.reshape(n, o, holder)[each.points, :, : each.values.shape[1]] @ each.slopes
             place = (each.points[:, None] * o + np.arange(o)).ravel()

@@ -20,6 +20,7 @@ from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.progress import Step
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.validation import Prediction
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.machining_setup import Workpiece
@@ -39,6 +40,14 @@ class IdentificationCode(RemarkCode):
     WEAK_SIGNAL = "weak-signal"
     UNEXPLAINED = "unexplained"
     CONTRADICTING_CUTS = "contradicting-cuts"
+    DRIFTS_WITH_TIME = "drifts-with-time"
+    CHANGES_WITH_SPEED = "changes-with-speed"
+    FORCE_ORDERS = "force-orders"
+    FORCE_SCALES = "force-scales"
+    CLAMPED_ANEW = "clamped-anew"
+    SENSOR_DISTANCE = "sensor-distance"
+    NOT_AS_PREDICTED = "not-as-predicted"
+    DISTANCE_UNTOLD = "distance-untold"
     TWO_SOLUTIONS = "two-solutions"
     NO_AGREEMENT = "no-agreement"
     WIDE_POSTERIOR = "wide-posterior"
@@ -187,6 +196,8 @@ class Identification(Shown):
         The same in the terms of the campaign's drawings.
     workpiece_side : WorkpieceSide or None
         What accelerometers on table or workpiece showed.
+    predictions : tuple of Prediction
+        How the lines of each tooling are predicted by the other ones.
     """
 
     status: Status
@@ -208,6 +219,7 @@ class Identification(Shown):
     toolings: KnownToolings | None = None
     learned: tuple[LearnedValue, ...] = ()
     workpiece_side: WorkpieceSide | None = None
+    predictions: tuple[Prediction, ...] = ()
 
     @property
     def at_minimum(self) -> bool:

@@ -9,9 +9,12 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.data import LEVER, IdentificationData
 from rcsa_ident.tool_holder.drawings import RoughToolings
 from rcsa_ident.tool_holder.rough import RoughToolHolder
+
+#: Standard deviation of a distance that is told as exact [m].
+LEAST_SPREAD = 1e-5
 
 
 def with_scales(data: IdentificationData, depth: FloatArray, gain: FloatArray, delay: FloatArray) -> IdentificationData:
@@ -81,6 +84,37 @@ def with_cross_talk(data: IdentificationData, spread: FloatArray) -> Identificat
         axes.append(axis)
     more = tuple(float(spread[i]) for i, axis in enumerate(axes) if axis.axis in felt)
     return replace(data, axes=tuple(axes), talk_place=felt).with_unknowns(more, None)
+
+
+def with_distances(data: IdentificationData, distance: FloatArray, spread: FloatArray) -> IdentificationData:
+    """Return the same data whose flange sensors look behind the joint.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    distance : array, shape (axes,) [m]
+        Towards the spindle's rear; negative: at the holder.
+    spread : array, shape (axes,) [m]
+        Its standard deviation; 0 where it is known exactly.
+    """
+    axes = tuple(replace(axis, behind=float(d) / LEVER) for axis, d in zip(data.axes, distance, strict=True))
+    seeing = [i for i, axis in enumerate(axes) if axis.of_flange]
+    place = {axes[i].axis: len(data.coefficient_spread) + k for k, i in enumerate(seeing)}
+    # an unknown all the same: whether the lines speak against what was told is asked of it
+    more = tuple(max(float(spread[i]), LEAST_SPREAD) / LEVER for i in seeing)
+    return replace(data, axes=axes, distance_place=place).with_unknowns(more, None)
+
+
+def without_distances(data: IdentificationData) -> IdentificationData:
+    """Return the same data whose flange sensors look at the flange itself, without the unknowns of `with_distances`, the last ones."""
+    count = len(data.distance_place)
+    if not count:
+        return data
+    left = len(data.coefficient_spread) - count
+    axes = [
+        replace(axis, behind=0.0, force_slope=axis.force_slope[:, :left], across_slope=axis.across_slope[:, :left]) for axis in data.axes
+    ]
+    return replace(data, axes=tuple(axes), coefficient_spread=data.coefficient_spread[:left], distance_place={})
 
 
 def with_rough_forces(data: IdentificationData) -> IdentificationData:

@@ -13,9 +13,14 @@ FEWEST_OF_HOUSING = 3
 
 
 class Status(StrEnum):
-    """May the answer be used? With doubts where it is suspect; one that has failed has no axes."""
+    """May the answer be used?
+
+    It has converged where the toolings predict each other within their bands; it is not validated where nothing could be compared, suspect
+    where something speaks against it. One that has failed has no axes.
+    """
 
     CONVERGED = "converged"
+    NOT_VALIDATED = "not validated"
     SUSPECT = "suspect"
     FAILED = "failed"
 

@@ -14,9 +14,8 @@ import numpy as np
 import scipy.optimize
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm
+from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm, scaled_force
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.misfit import scaled_force
 from rcsa_ident.identification.model_order import unexplained_share
 from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide, gives_way

@@ -122,7 +122,10 @@ def _both_planes(identification: Identification, deviations: ModeDeviations) -> 
 
 
 def _axes_to_json(identification: Identification, deviations: ModeDeviations) -> dict[str, Any]:
-    return {axis.upper(): _axis_to_json(part, deviations.get(axis)) for axis, part in identification.axes.items()}
+    found = {axis.upper(): _axis_to_json(part, deviations.get(axis)) for axis, part in identification.axes.items()}
+    for each in identification.predictions:
+        found[each.axis.upper()].setdefault("validation", {})[each.tooling] = {"error": each.error, "promised": each.promised}
+    return found
 
 
 def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | None) -> dict[str, Any]:
@@ -185,6 +188,8 @@ def _sensor_to_json(sensor: Sensor) -> dict[str, Any]:
         data["mount_resonance_hz"] = sensor.mount_resonance
     if sensor.rotation != 0.0:
         data["rotation_deg"] = float(np.degrees(sensor.rotation))
+    if sensor.distance is not None:
+        data |= {"distance_behind_flange_mm": 1e3 * sensor.distance, "distance_spread_mm": 1e3 * sensor.distance_spread}
     return data
 
 

@@ -20,19 +20,24 @@ from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP
 from rcsa_ident.units import from_hz, from_rpm, to_rpm
+from rcsa_ident.virtual.changes import Changes, ChipLaw, JointChanges, Warming
 from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
 from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.virtual.sensors import UNDISTURBED, SensorSuite
 from rcsa_ident.virtual.workpiece_side import ROLES, SideMode, VirtualWorkpieceSide
 
-_TOP = ("machine", "shaft", "materials", "bearings", "housing", "joint", "workpiece_side", "sensors", "disturbances", "workpiece", "cuts")
+_TOP = (
+    "machine", "shaft", "materials", "bearings", "housing", "joint", "workpiece_side", "sensors", "disturbances", "warming",
+    "joint_changes", "chip_law", "workpiece", "cuts",
+)  # fmt: skip
 _BEARING = ("position_mm", "stiffness", "damping", "softening_per_rpm", "angle_deg")
 _HOUSING = ("position_mm", "mass", "inertia", "stiffness", "damping", "tilting_stiffness", "tilting_damping", "angle_deg")
 _SIDE_MODE = ("natural_frequency_hz", "damping_ratio", "stiffness_n_per_m")
 _JOINT = ("translational_stiffness", "translational_damping", "rotational_stiffness", "rotational_damping")
 _SENSORS = (
-    "sampling_rate_hz", "fixture_position_mm", "housing_positions_mm", "flange_sensitivity", "flange_noise_nm", "flange_drift_um",
+    "sampling_rate_hz", "fixture_position_mm", "flange_position_mm", "housing_positions_mm",
+    "flange_sensitivity", "flange_noise_nm", "flange_drift_um",
     "flange_delay_s", "flange_bandwidth_hz", "fixture_sensitivity", "fixture_noise", "fixture_delay_s", "fixture_bandwidth_hz",
     "roundness_um",
     "roundness_orders", "cutter_runout_um", "speed_error_percent", "trigger", "tooth_angle_deg",
@@ -44,6 +49,10 @@ _CUTS = (
 _DISTURBANCES = (
     "speed_wander_percent", "wander_time_s", "clock_error_percent", "hum_um", "mains_hz", "machine_noise", "knocks_per_s", "knock_um",
 )  # fmt: skip
+
+_WARMING = ("loss_percent", "time_constant_s", "exponent", "running_s", "pause_s", "warm_up_s", "shuffled")
+_JOINT_CHANGES = ("softening_percent", "amplitude_um", "reclamping_percent")
+STEADY = Changes()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +73,8 @@ class MachineFile:
     disturbances : Disturbances
     workpiece_side : VirtualWorkpieceSide or None
         What gives way under the workpiece, with a pair of accelerometers on it; None where it is rigid.
+    changes : Changes
+        What is not the same in every cut.
     """
 
     name: str
@@ -75,6 +86,7 @@ class MachineFile:
     truth_toolings: tuple[Path, ...] = ()
     disturbances: Disturbances = UNDISTURBED
     workpiece_side: VirtualWorkpieceSide | None = None
+    changes: Changes = STEADY
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,6 +120,11 @@ class RobotSetup:
     def workpiece_side(self) -> None:
         """Nothing else gives way."""
         return
+
+    @property
+    def changes(self) -> Changes:
+        """Each cut finds the same robot."""
+        return STEADY
 
 
 def read_machine(path: str | Path) -> MachineFile:
@@ -150,6 +167,7 @@ def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> 
             gyroscopic=head.flag("gyroscopic", True),
             fixture_position=sensors.number("fixture_position_mm", "mm", 0.0, least=-1000.0, most=5000.0) * 1e-3,
             housing_positions=_positions(sensors),
+            seen_at=sensors.number("flange_position_mm", "mm", 0.0, least=-100.0, most=200.0) * 1e-3,
         )
         fastest = max(plan.programmed)
         for i, bearing in enumerate(spindle.bearings):
@@ -166,7 +184,34 @@ def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> 
             truth_toolings=_paths(cuts, "truth_toolings", folder, required=False),
             disturbances=_disturbances(top.table("disturbances", _DISTURBANCES, {})),
             workpiece_side=_workpiece_side(top.table("workpiece_side", ("role", "x", "y"))) if "workpiece_side" in top else None,
+            changes=_changes(top),
         )
+
+
+def _changes(top: Table) -> Changes:
+    warming = joint = law = None
+    if "warming" in top:
+        table = top.table("warming", _WARMING)
+        warming = Warming(
+            table.number("loss_percent", "%", least=-50.0, most=50.0) * 1e-2,
+            table.number("time_constant_s", "s", 900.0, above=0.0),
+            table.number("exponent", "", 1.25, least=0.0, most=3.0),
+            table.number("running_s", "s", 60.0, above=0.0),
+            table.number("pause_s", "s", 20.0, least=0.0),
+            table.number("warm_up_s", "s", 0.0, least=0.0),
+            table.flag("shuffled", False),
+        )
+    if "joint_changes" in top:
+        table = top.table("joint_changes", _JOINT_CHANGES)
+        joint = JointChanges(
+            table.number("softening_percent", "%", 0.0, least=0.0, most=99.0) * 1e-2,
+            table.number("amplitude_um", "um", 0.1, above=0.0) * 1e-6,
+            table.number("reclamping_percent", "%", 0.0, least=0.0, most=50.0) * 1e-2,
+        )
+    if "chip_law" in top:
+        table = top.table("chip_law", ("exponent", "thickness_mm"))
+        law = ChipLaw(table.number("exponent", "", least=-0.9, most=0.0), table.number("thickness_mm", "mm", 0.05, above=0.0) * 1e-3)
+    return Changes(warming, joint, law)
 
 
 def _bearing(table: Table) -> Bearing:

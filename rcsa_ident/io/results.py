@@ -21,7 +21,7 @@ from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity
 from rcsa_ident.units import from_hz, to_hz
 
 SCHEMA_VERSION = 1
-STATUSES = ("converged", "suspect", "failed")
+STATUSES = ("converged", "not validated", "suspect", "failed")
 AXES = {"X": Dof.X, "Y": Dof.Y}
 LARGEST_RESULT = 64 * MEGABYTE
 _JOINT = ("translational_stiffness", "translational_damping", "rotational_stiffness", "rotational_damping")

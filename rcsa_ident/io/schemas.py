@@ -169,6 +169,9 @@ _MACHINES = (
         },
         "sensors": {"housing_positions_mm": [350.0]},
         "workpiece_side": {"role": "workpiece", "x": [_SIDE_MODE]},
+        "warming": {"loss_percent": 5.0},
+        "joint_changes": {"reclamping_percent": 3.0},
+        "chip_law": {"exponent": -0.2},
     },
 )
 _MODE = {"natural_frequency_hz": 500.0, "damping_ratio": 0.03}

@@ -65,6 +65,8 @@ _SENSOR = (
     "gain_spread_percent",
     "cross_talk_percent",
     "delay_spread_us",
+    "distance_behind_flange_mm",
+    "distance_spread_mm",
 )
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
 
@@ -331,6 +333,10 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         table.refuse("sensitivity", "0", "a number other than 0 [V/m, V/(m/s^2), V/N], 1.0 where the file is in SI")
     angle = table.number("tooth_angle_deg", "deg", None, least=-360.0, most=360.0)
     role = table.text("role", None, choices=tuple(Role))
+    distance = table.number("distance_behind_flange_mm", "mm", None, least=-100.0, most=300.0)
+    for key in ("distance_behind_flange_mm", "distance_spread_mm"):
+        if key in table and quantity is not Quantity.DISPLACEMENT:
+            table.refuse(key, describe(table.data[key]), f"none of a {quantity} sensor")
     return Sensor(
         name,
         quantity,
@@ -346,6 +352,8 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         table.number("gain_spread_percent", "%", 2.0, least=0.0, most=50.0) * 1e-2,
         table.number("cross_talk_percent", "%", 1.5, least=0.0, most=50.0) * 1e-2,
         table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) / 1e6,
+        None if distance is None else distance * 1e-3,
+        table.number("distance_spread_mm", "mm", 1.0, least=0.0, most=100.0) * 1e-3,
     )
 
 

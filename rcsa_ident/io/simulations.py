@@ -22,6 +22,7 @@ from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.units import from_hz, to_rpm
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
+from rcsa_ident.virtual.changes import course_of
 from rcsa_ident.virtual.machine import CutPlan
 from rcsa_ident.virtual.robot import robot_cut_id
 from rcsa_ident.virtual.sensors import accelerometer_places
@@ -57,6 +58,7 @@ def write_simulation(
     receptances: Iterable[TrueReceptances],
     flange: TrueFlange,
     progress: Progress | None = None,
+    seed: int = 1,
 ) -> SimulatedCampaign:
     """Write the campaign into `out` and the truth into ``<out>.truth``; whoever ends it half-way finds neither.
 
@@ -73,6 +75,8 @@ def write_simulation(
     flange : TrueFlange
         Receptances of the bare spindle.
     progress : callable of (done, total), optional
+    seed : int
+        Of the cuts.
     """
     out = Path(out)
     truth = out.with_name(out.name + ".truth")
@@ -84,7 +88,7 @@ def write_simulation(
         for place in ("tip", "cross", "forces"):
             (known / place).mkdir()
         _write_head(runs, dict(zip(setup.toolings, toolings, strict=True)))
-        write_text(runs / "campaign.toml", campaign_text(setup, toolings))
+        write_text(runs / "campaign.toml", campaign_text(setup, toolings, seed))
         rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
         for done, cut in enumerate(cuts, start=1):
             _write_columns(known / "forces" / f"{cut.id}.csv", ("order",), np.arange(cut.force_lines.shape[0]), cut.force_lines)
@@ -139,14 +143,13 @@ def _write_columns(path: Path, first: tuple[str], abscissa: FloatArray, values: 
     write_text(path, "\n".join([",".join(header), *lines]) + "\n")
 
 
-def campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
+def campaign_text(setup: MachineFile, toolings: Sequence[Tooling], seed: int = 1) -> str:
     """Return the campaign file, as a machinist would write it; recordings are ``recordings/<cut>_cut.h5`` and ``_air.h5``."""
     plan = setup.plan
-    cuts = [
-        cut_keys(f"{tooling.name}-{name}", tooling.name, _conditions(plan, speed), last)
-        for tooling in toolings
-        for name, speed, last, _ in plan.cuts
-    ]
+    # in the order in which they were made
+    course = course_of(plan, setup.spindle, setup.changes, len(toolings), seed)
+    told = [(toolings[turn.tooling].name, *plan.cuts[turn.cut]) for turn in course]
+    cuts = [cut_keys(f"{tooling}-{name}", tooling, _conditions(plan, speed), last) for tooling, name, speed, last, _ in told]
     return _campaign_text(setup.name, setup, toolings, cuts)
 
 
@@ -223,7 +226,8 @@ def _campaign_text(name: str, setup: MachineFile | RobotSetup, toolings: Sequenc
     suite = setup.sensors
     gap = ("displacement", suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
     acceleration = ("acceleration", suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth)
-    sensors = {f"flange_{axis.lower()}": _sensor(axis, *gap) for axis in "XY"}
+    told = {"distance_behind_flange_mm": 1e3 * setup.spindle.seen_at, "distance_spread_mm": 0.0}
+    sensors = {f"flange_{axis.lower()}": _sensor(axis, *gap) | told for axis in "XY"}
     side = None if setup.workpiece_side is None else setup.workpiece_side.role
     places = accelerometer_places(len(setup.spindle.housing_positions), side)
     for place in places:

@@ -7,7 +7,7 @@ to all of them in the same way, and nobody downstream asks which of them it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -228,7 +228,13 @@ class Machine(TipSource, Drawn):
         """
         return respond_over(self._along(axes), frozen(omega), at_flange)
 
-    def coupled(self, tooling: Tooling | ToolAssembly, omega: FloatArray, axes: Sequence[Dof] | None = None) -> UncertainReceptance:
+    def coupled(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray,
+        axes: Sequence[Dof] | None = None,
+        behind: Mapping[Dof, float] | None = None,
+    ) -> UncertainReceptance:
         """Return the receptances of a tooling on the machine between tip and spindle, translations and slopes.
 
         Parameters
@@ -237,6 +243,9 @@ class Machine(TipSource, Drawn):
         omega : array, shape (n,) [rad/s]
         axes : sequence of Dof, default all
             Only these machine axes, and what they feel of others.
+        behind : mapping of Dof to float, optional [m]
+            How far behind the joint sensors look at the spindle, along each axis; negative: at the tool-holder in front of it. By default
+            the spindle's translations are those at the joint.
 
         Returns
         -------
@@ -253,7 +262,7 @@ class Machine(TipSource, Drawn):
         assembly, omega = self.fitted(tooling).assembly, frozen(omega)
         turning = self.turning
         holder = tool_holder_receptance(assembly, omega) if turning is None else turning_receptance(assembly, omega, turning)
-        return respond_over(self._along(axes), omega, at_ends, holder)
+        return respond_over(self._along(axes), omega, partial(at_ends, behind=behind), holder)
 
     def tip(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
@@ -99,10 +99,12 @@ def at_flange(candidate: JointedFlange, _holder: Receptance | None, omega: Float
     return candidate.flange.receptance(omega)
 
 
-def at_ends(candidate: JointedFlange, holder: Receptance | None, omega: FloatArray) -> Receptance:
-    """Return a tool-holder's receptances on a candidate, between tip and spindle."""
+def at_ends(
+    candidate: JointedFlange, holder: Receptance | None, omega: FloatArray, behind: Mapping[Dof, float] | None = None
+) -> Receptance:
+    """Return a tool-holder's receptances on a candidate, between tip and spindle; `behind` as of `couple`."""
     assert holder is not None
-    return couple(holder, candidate.flange.receptance(omega), candidate.joint)
+    return couple(holder, candidate.flange.receptance(omega), candidate.joint, behind)
 
 
 def _values(part: PartResponse, places: Places, candidate: JointedFlange) -> ComplexArray:

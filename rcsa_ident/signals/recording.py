@@ -12,7 +12,7 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.plausibility import RATE
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, RemarkCode
 from rcsa_ident.shown import Drawn
 
 #: Samples of a block, in which recordings are gone through.
@@ -49,6 +49,13 @@ SI_UNITS = {
 }
 
 
+class SensorCode(RemarkCode):
+    """What may be said of a campaign's sensors."""
+
+    DISTANCE_UNTOLD = "distance-untold"
+    """Nobody has told how far behind the flange a displacement sensor looks."""
+
+
 class Role(StrEnum):
     """What an accelerometer is fixed to."""
 
@@ -60,6 +67,8 @@ class Role(StrEnum):
 
 #: Of a sensor on its mount, above which its response is not told by the resonance's frequency alone.
 _LEAST_MOUNT = 0.2
+#: Where a displacement sensor may look from the flange's face towards the rear, and how little may be known of that [m].
+_NEAREST, _FARTHEST, _WIDEST = -0.1, 0.3, 0.1
 #: What a campaign's sensors measure; sound gives no length.
 CAMPAIGN_QUANTITIES = tuple(quantity for quantity in Quantity if quantity is not Quantity.SOUND)
 
@@ -97,6 +106,11 @@ class Sensor:
         count where something of the campaign's drawings is not exact, too.
     delay_spread : float [s]
         Standard deviation of the delay; likewise.
+    distance : float or None [m]
+        How far a displacement sensor looks behind the face between holder and spindle, towards the spindle's rear; negative: at the
+        holder. None where nobody has told it.
+    distance_spread : float [m]
+        Its standard deviation.
 
     Examples
     --------
@@ -121,6 +135,8 @@ class Sensor:
     gain_spread: float = 0.02
     cross_talk_spread: float = 0.015
     delay_spread: float = 5e-6
+    distance: float | None = None
+    distance_spread: float = 1e-3
 
     def __post_init__(self) -> None:
         # a dynamometer also feels along the spindle
@@ -133,6 +149,13 @@ class Sensor:
             if not 0.0 <= getattr(self, name) <= most:
                 unit = "s" if name == "delay_spread" else "-"
                 raise InputError(f"sensors.{self.name}.{name}", getattr(self, name), f"a number from 0 to {most:g} [{unit}]")
+        if self.distance is not None:
+            if self.quantity is not Quantity.DISPLACEMENT:
+                raise InputError(f"sensors.{self.name}.distance", self.distance, f"none of a {self.quantity} sensor")
+            if not _NEAREST <= self.distance <= _FARTHEST:
+                raise InputError(f"sensors.{self.name}.distance", self.distance, f"a number from {_NEAREST:g} to {_FARTHEST:g} [m]")
+        if not 0.0 <= self.distance_spread <= _WIDEST:
+            raise InputError(f"sensors.{self.name}.distance_spread", self.distance_spread, f"a number from 0 to {_WIDEST:g} [m]")
         if not abs(self.delay) <= 1.0:
             raise InputError(f"sensors.{self.name}.delay", self.delay, "a number from -1 to 1 [s]")
         if self.bandwidth is not None:
@@ -230,6 +253,26 @@ class Recording(Drawn):
 def first_sensor(sensors: Sequence[Sensor], quantity: Quantity, axis: Dof | None = None) -> Sensor | None:
     """Return the first sensor of this quantity and axis, or None."""
     return next((s for s in sensors if s.quantity is quantity and (axis is None or s.axis is axis)), None)
+
+
+def untold_distances(sensors: Sequence[Sensor]) -> tuple[Remark, ...]:
+    """Return a remark on displacement sensors of which nobody has told how far behind the flange they look; none where all are told.
+
+    Examples
+    --------
+    >>> gap = Sensor("gap_x", Quantity.DISPLACEMENT, Dof.X)
+    >>> [remark.code.value for remark in untold_distances([gap])]
+    ['distance-untold']
+    >>> untold_distances([Sensor("gap_x", Quantity.DISPLACEMENT, Dof.X, distance=0.02)])
+    ()
+    """
+    untold = [sensor.name for sensor in sensors if sensor.quantity is Quantity.DISPLACEMENT and sensor.distance is None]
+    if not untold:
+        return ()
+    looks = "looks" if len(untold) == 1 else "look"
+    way = "tell distance_behind_flange_mm (a ruler is enough); without it the tip is uncertain by about 1 % per millimetre"
+    words = f"nobody has told how far behind the flange {' and '.join(untold)} {looks}: {way}"
+    return (Remark(SensorCode.DISTANCE_UNTOLD, words),)
 
 
 def accelerometers(sensors: Sequence[Sensor], axis: Dof, role: Role) -> tuple[Sensor, ...]:

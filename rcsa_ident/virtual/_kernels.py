@@ -39,7 +39,8 @@ def cut_force(position, tooth, edges, places, cut, before, path, force):
     cosine of its lean, width, entry, exit and spread along the helix of each tooth's levels, shape (teeth, levels, 8); places: steps at
     which tooth j + 1 + k stood where j is now, shape (teeth, passes) or, where lags are unlike, (teeth, passes x levels); before: feed per
     step before the first; path: earlier positions.
-    cut: angle of tooth 1, rotation in a step, then the force per width and chip, and per width: tangential, radial, axial, and their edges.
+    cut: angle of tooth 1, rotation in a step, then the force per width and chip, and per width: tangential, radial, axial, and their edges,
+    the exponent of the chip in the force per chip, and one over the chip at which that force is the one told.
     """
     force[:] = 0.0
     teeth, levels = edges.shape[0], edges.shape[1]
@@ -76,6 +77,8 @@ def cut_force(position, tooth, edges, places, cut, before, path, force):
                 continue
             sine, cosine = edges[j, k, 2], edges[j, k, 3]
             chip *= sine
+            if cut[8] != 0.0:
+                chip *= (chip * cut[9]) ** cut[8]
             share *= edges[j, k, 4]
             tangential = share * (cut[2] * chip + cut[5])
             radial = share * (cut[3] * chip + cut[6])

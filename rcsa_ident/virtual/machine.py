@@ -126,6 +126,8 @@ class VirtualSpindle:
         Where on the housing the flange sensor is held, from the flange face towards the rear.
     housing_positions : tuple of float [m]
         Where on it further accelerometers stand, a pair for X and Y at each.
+    seen_at : float [m]
+        Where the flange sensors look, from the flange face towards the rear; negative: on the holder.
     """
 
     shaft: tuple[BeamSegment, ...]
@@ -135,6 +137,7 @@ class VirtualSpindle:
     gyroscopic: bool = True
     fixture_position: float = 0.0
     housing_positions: tuple[float, ...] = ()
+    seen_at: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.shaft:
@@ -145,6 +148,8 @@ class VirtualSpindle:
         for bearing in self.bearings:
             if bearing.position > length + 1e-9:
                 raise InputError("bearings.position_mm", bearing.position * 1e3, f"0 to the shaft's length, {length * 1e3:g} mm")
+        if not self.seen_at <= length:
+            raise InputError("sensors.flange_position_mm", self.seen_at * 1e3, f"at most the shaft's length, {length * 1e3:g} mm")
 
     @property
     def shaft_length(self) -> float:

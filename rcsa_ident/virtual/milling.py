@@ -14,6 +14,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual._kernels import mill
+from rcsa_ident.virtual.changes import ChipLaw
 from rcsa_ident.virtual.levels import levels_of
 from rcsa_ident.virtual.reduction import Poles
 from rcsa_ident.virtual.workpiece_side import WORKPIECE
@@ -53,7 +54,8 @@ class CutHistory:
     force : array, shape (n, 2) [N]
         Force on the tool, machine axes X and Y.
     tip, flange, fixture : arrays, shape (n, 2) [m]
-        Absolute displacements, X and Y; the tip's is relative to the workpiece where that gives way, too.
+        Absolute displacements, X and Y; the tip's is relative to the workpiece where that gives way, too, and the flange's is seen where
+        its sensors look.
     acceleration : array, shape (n, 2 + 2 h) [m/s^2]
         Acceleration of the fixture, then of each of h further points, of the housing and last of the workpiece, X and Y.
     axial : array, shape (n,) [N]
@@ -85,6 +87,7 @@ def mill_cut(
     start_angle: float = 0.0,
     slices: int = 8,
     course: Course | None = None,
+    law: ChipLaw | None = None,
 ) -> CutHistory:
     """Simulate a cut of `count` instants, `step` apart, already in the material and near its steady state.
 
@@ -112,6 +115,8 @@ def mill_cut(
     course : Course, optional
         How the spindle turns and the tool moves on and into the material, `count` instants; it takes the place of `start_angle`. Else both
         are even, in the material from the start.
+    law : ChipLaw, optional
+        By which the force follows the chip where no straight line does; the edges' forces come on top.
 
     Notes
     -----
@@ -123,7 +128,7 @@ def mill_cut(
     inputs = dynamics.inputs.shape[1]
     if inputs not in (2, 3):
         raise InputError("inputs", inputs, "two or three: tip.x, tip.y, and tip.z where the machine gives way along it")
-    lines = rigid_force_lines(cutter, conditions, coefficients, slices)[:, :inputs]
+    lines = rigid_force_lines(cutter, conditions, coefficients, slices, law=law)[:, :inputs]
     order = np.arange(lines.shape[0])
     iw = 1j * speed * order
     course = _even(conditions, cutter.teeth, step, count, start_angle) if course is None else course
@@ -138,14 +143,15 @@ def mill_cut(
     second = (first - 1.0) / x
     gain = step * np.stack([first - second, second], axis=1)[:, :, :, None] * np.stack([part.inputs for part in parts])[:, None]
     names = [str(c) for c in dynamics.coordinates]
-    rows = [names.index(f"{point}.{axis}") for point in ("tip", "flange", "fixture") for axis in "xy"]
+    looked_at = "seen" if "seen.x" in names else "flange"
+    rows = [names.index(f"{point}.{axis}") for point in ("tip", looked_at, "fixture") for axis in "xy"]
     felt = rows[4:] + [k for k, name in enumerate(names) if name.startswith(("housing", WORKPIECE)) and "'" not in name]
     shape = 2.0 * np.stack([np.concatenate([part.outputs[rows], part.outputs[felt] * part.pole**2]) for part in parts])
     # a force at the tip accelerates the workpiece at once, the housing only through what the basis leaves out
     through = 2.0 * (dynamics.outputs[felt] * dynamics.pole) @ dynamics.inputs
 
     force = np.zeros((count, 3))
-    teeth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
+    teeth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, law)
     columns = np.column_stack([course.angle, course.way, course.width])
     result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, teeth, ahead, cut, turn, columns, force)
     return CutHistory(
@@ -161,7 +167,12 @@ def mill_cut(
 
 
 def rigid_force_lines(
-    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, slices: int = 8, samples: int = 4 * _START_ORDERS
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+    slices: int = 8,
+    samples: int = 4 * _START_ORDERS,
+    law: ChipLaw | None = None,
 ) -> np.ndarray:
     """Return the force of a tool that does not vibrate as F = Re sum_m lines[m] e^{i m Omega t}, shape (orders, 3) [N].
 
@@ -176,9 +187,11 @@ def rigid_force_lines(
         Levels of the depth, for helix and shape.
     samples : int
         Instants of a revolution.
+    law : ChipLaw, optional
+        As in `mill_cut`.
     """
     step = 2.0 * np.pi / conditions.spindle_speed / samples
-    teeth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
+    teeth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, law)
     course = _even(conditions, cutter.teeth, step, samples, 0.0)
     columns = np.column_stack([course.angle, course.way, course.width])
     force = np.zeros((samples, 3))
@@ -198,7 +211,12 @@ def _even(conditions: CuttingConditions, teeth: int, step: float, count: int, st
 
 
 def _cut_arrays(
-    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, step: float, slices: int
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+    step: float,
+    slices: int,
+    law: ChipLaw | None,
 ) -> tuple[Any, ...]:
     """The kernel's view of a cut: teeth with their edges, angles between them, numbers, axes."""
     speed = conditions.spindle_speed
@@ -213,7 +231,8 @@ def _cut_arrays(
         raise InputError("step", f"{step:g} s", f"at most a tooth period, {np.min(ahead) / speed:g} s")
     c = coefficients
     chip = c.tangential * np.array([1.0, c.radial_ratio, c.axial_ratio])
-    cut = np.array([0.0, speed * step, *chip, c.tangential_edge, c.radial_edge, c.axial_edge])
+    curve = (0.0, 0.0) if law is None else (law.exponent, 1.0 / law.thickness)
+    cut = np.array([0.0, speed * step, *chip, c.tangential_edge, c.radial_edge, c.axial_edge, *curve])
     return (cutter.tooth_angle.copy(), levels.columns), ahead, cut, np.ascontiguousarray(conditions.machine_from_feed)
 
 

@@ -34,7 +34,8 @@ class Rotor:
     ports : array, shape (p, d)
         Motion at each coordinate as a combination of the freedoms; its transpose spreads a force.
     coordinates : tuple of Coordinate, length p
-        ``tip`` (cutting end), ``flange`` (spindle side of the joint), ``fixture`` (sensor holder on the housing).
+        ``tip`` (cutting end), ``flange`` (spindle side of the joint), ``seen`` (where the flange sensors look, if not there),
+        ``fixture`` (sensor holder on the housing).
     """
 
     mass: scipy.sparse.csc_array
@@ -71,7 +72,7 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
     mesh = Mesh()
     if tooling is not None:
         add_tooling(mesh, tooling, refinement)
-    stops = [nanometres(b.position) for b in spindle.bearings]
+    stops = [nanometres(b.position) for b in spindle.bearings] + [nanometres(spindle.seen_at)] * (spindle.seen_at > 0.0)
     mesh.body(SHAFT, 0.0, spindle.shaft, element_edges(0.0, spindle.shaft, stops, refinement))
     nodes = {z: node for (body, z), node in mesh.nodes.items() if body == SHAFT}
     housing = mesh.new_node()
@@ -86,11 +87,18 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
     ports, coordinates = [], []
     on_housing = {"fixture": spindle.fixture_position, **dict(zip(housing_points(spindle), spindle.housing_positions, strict=True))}
     places: dict[str, tuple[tuple[int, float], ...]] = {"flange": ((2 * nodes[0], 1.0),)}
+    if spindle.seen_at > 0.0:
+        places["seen"] = ((2 * nodes[nanometres(spindle.seen_at)], 1.0),)
     for name, position in on_housing.items():
         places[name] = ((2 * housing, 1.0), (2 * housing + 1, position - spindle.housing.position))
     if tooling is not None:
         places = {"tip": ((2 * mesh.nodes[TOOL, 0], 1.0),), **places}
         on_holder = [z for body, z in mesh.nodes if body == HOLDER]
+        if spindle.seen_at < 0.0:
+            ahead, there = sorted(on_holder), nanometres(tooling.stickout + tooling.holder_length + spindle.seen_at)
+            k = min(max(int(np.searchsorted(ahead, there)), 1), len(ahead) - 1)
+            share = (there - ahead[k - 1]) / (ahead[k] - ahead[k - 1])
+            places["seen"] = tuple((2 * mesh.nodes[HOLDER, ahead[k - 1 + j]], (1.0 - share, share)[j]) for j in (0, 1))
         for name, distance in ({} if points is None else points).items():
             nearest = min(on_holder, key=lambda z: abs(z - nanometres(distance)))
             places[name] = ((2 * mesh.nodes[HOLDER, nearest], 1.0),)

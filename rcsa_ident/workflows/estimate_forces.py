@@ -179,7 +179,8 @@ def observe(
     omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
     omega = omega[(omega >= answers[0]) & (omega <= answers[1])]
     here = machine.at(speed)
-    coupled = here.coupled(assembly, omega, axes)
+    behind = _looks(cut, axes)
+    coupled = here.coupled(assembly, omega, axes, behind)
     tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
     together = _feel_each_other(here, axes)
     if not together:
@@ -204,7 +205,7 @@ def observe(
         estimate = replace(estimate, force=_above(estimate.force, band[0], estimate.step))
     errors: dict[Dof, float] = {}
     for group in groups:
-        errors |= _model_error(here, group, assembly, estimate, band, speed)
+        errors |= _model_error(here, group, behind, assembly, estimate, band, speed)
     response = _responses(observer, omega, cross, cut, speed, smooth)
     return MonitoredCut(
         _widened(estimate, [errors[axis] for axis in axes]),
@@ -391,6 +392,12 @@ def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, F
     return np.stack(gap, axis=1), np.stack(acceleration, axis=1)
 
 
+def _looks(recording: Recording, axes: Sequence[Dof]) -> dict[Dof, float]:
+    """How far behind the flange each axis' displacement sensor looks [m]: at the flange itself where nobody has told it."""
+    shown = {axis: recording.sensor(Quantity.DISPLACEMENT, axis) for axis in axes}
+    return {axis: sensor.distance for axis, sensor in shown.items() if sensor is not None and sensor.distance is not None}
+
+
 def _cross(coupled: Receptance, axes: Sequence[Dof]) -> ComplexArray:
     """C31: the spindle's motions (rows) over forces at the tip (columns), shape (n, a, a) [m/N]."""
     columns = [np.stack([coupled.between(f"{SPINDLE}.{row}", f"tip.{axis}") for row in axes], axis=1) for axis in axes]
@@ -419,7 +426,13 @@ def _unseen(
 
 
 def _model_error(
-    machine: Machine, axes: tuple[Dof, ...], assembly: ToolAssembly, estimate: ForceEstimate, band: tuple[float, float], speed: float
+    machine: Machine,
+    axes: tuple[Dof, ...],
+    behind: Mapping[Dof, float],
+    assembly: ToolAssembly,
+    estimate: ForceEstimate,
+    band: tuple[float, float],
+    speed: float,
 ) -> dict[Dof, float]:
     """Standard deviation of the forces that is left by what is not known of the machine [N]: the forces' lines, each with its C31's.
 
@@ -430,7 +443,7 @@ def _model_error(
     order = np.arange(amplitude.shape[0])
     order = order[(order * speed >= band[0]) & (order * speed <= band[1])]
     power = np.abs(amplitude[order]) ** 2
-    coupled = machine.coupled(assembly, order * speed, axes)
+    coupled = machine.coupled(assembly, order * speed, axes, behind)
     deviation = coupled.deviation()
     if (Coordinate(SPINDLE, axes[0]), Coordinate("tip", axes[0])) not in deviation:
         return dict.fromkeys(axes, 0.0)

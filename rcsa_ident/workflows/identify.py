@@ -21,7 +21,14 @@ from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification, IdentificationCode
-from rcsa_ident.identification.rough_data import with_corners, with_cross_talk, with_rough_forces, with_rough_toolings, with_scales
+from rcsa_ident.identification.rough_data import (
+    with_corners,
+    with_cross_talk,
+    with_distances,
+    with_rough_forces,
+    with_rough_toolings,
+    with_scales,
+)
 from rcsa_ident.identification.workpiece_side import workpiece_side
 from rcsa_ident.machining_setup import Campaign, Cut, HammerTest, Tooling
 from rcsa_ident.remarks import Remark
@@ -312,7 +319,13 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     unlike = [name for name, t in campaign.toolings.items() if t.cutter.repeats == 1]
     turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
     data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning, unlike)
-    return replace(data, softening_spread=campaign.softening_spread)
+    shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
+    sensors = [shown.get(axis.axis) for axis in data.axes]
+    # where nobody tells it the flange itself is believed, and the lines are asked what they say to that
+    told = [(0.0, 0.0) if s is None or s.distance is None else (s.distance, s.distance_spread) for s in sensors]
+    data = with_distances(data, *np.array(told).reshape(-1, 2).T)
+    known_places = not data.of_flange or all(s is not None and s.distance is not None for s in sensors)
+    return replace(data, softening_spread=campaign.softening_spread, distance_told=known_places)
 
 
 def with_rough(

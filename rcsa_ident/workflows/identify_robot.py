@@ -18,6 +18,7 @@ from rcsa_ident.identification.posed.data import PosedData, check_postures, pose
 from rcsa_ident.identification.posed.fit import fit_robot
 from rcsa_ident.identification.posed.priors import arm_priors
 from rcsa_ident.identification.posed.result import RobotCode, RobotIdentification, answer
+from rcsa_ident.identification.rough_data import without_distances
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.remarks import Remark
@@ -68,11 +69,20 @@ def robot_data(campaign: Campaign, readings: Sequence[Reading], robot: FlexibleR
         raise InputError("link masses", "nothing", "mass, centre and inertia of the links: without them nothing vibrates")
     if campaign.rough:
         campaign = replace(campaign, toolings={name: replace(tooling, spread=EXACT) for name, tooling in campaign.toolings.items()})
-    data = data_of(campaign, readings)
+    _check_sensors(campaign)
+    data = without_distances(data_of(campaign, readings))
     beside = _Beside(campaign, data)
     postures, of_cut = check_postures([beside.cuts[id].posture for id in data.cut_ids], data.cut_ids, robot.model)
     teeth = {name: tooling.cutter.teeth for name, tooling in campaign.toolings.items()}
     return posed_data(data, robot, postures, of_cut, teeth, beside.rods, beside.axial), postures
+
+
+def _check_sensors(campaign: Campaign) -> None:
+    """Refuse displacement sensors that look elsewhere than at the flange itself."""
+    for sensor in campaign.sensors:
+        if sensor.distance:
+            allowed = "0, or nothing: of a robot the flange sensors are taken to look at the flange itself"
+            raise InputError(f"sensors.{sensor.name}.distance_behind_flange_mm", f"{1e3 * sensor.distance:g}", allowed)
 
 
 @dataclass(frozen=True, eq=False)

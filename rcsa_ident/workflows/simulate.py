@@ -13,9 +13,10 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.scaleout import Map
 from rcsa_ident.virtual.campaign import SimulatedCut, SimulatedRecord, TrueFlange, TrueReceptances
+from rcsa_ident.virtual.changes import Changes, Turn, changed, course_of
 from rcsa_ident.virtual.disturbances import Disturbances, turning
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
-from rcsa_ident.virtual.milling import Course, CutHistory, mill_cut, synchronous_lines
+from rcsa_ident.virtual.milling import Course, CutHistory, mill_cut, rigid_force_lines, synchronous_lines
 from rcsa_ident.virtual.reduction import Poles, ReducedRotor, alike, poles, reduced
 from rcsa_ident.virtual.robot import VirtualRobot, robot_cut_id, robot_rotor
 from rcsa_ident.virtual.rotor import frequency_response, rotor
@@ -51,6 +52,9 @@ class VirtualSetup(Protocol):
     def disturbances(self) -> Disturbances: ...
 
     @property
+    def changes(self) -> Changes: ...
+
+    @property
     def workpiece_side(self) -> VirtualWorkpieceSide | None: ...
 
 
@@ -79,7 +83,7 @@ class _Job:
 
 
 def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
-    """Yield every tooling's cut at every speed of the plan, in order.
+    """Yield every tooling's cut at every speed of the plan, in the order in which they are made.
 
     Parameters
     ----------
@@ -90,7 +94,7 @@ def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: M
     map : callable
         Runs the cuts; they do not depend on each other's order.
     """
-    yield from map(_Worker(setup), list(_jobs(setup, toolings, np.random.default_rng(seed))))
+    yield from map(_Worker(setup), list(_jobs(setup, toolings, seed)))
 
 
 def simulate_robot(setup: VirtualRobotSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
@@ -169,18 +173,45 @@ def _truth_frequency() -> FloatArray:
     return np.arange(first, last + 0.5 * step, step)
 
 
-def _jobs(setup: VirtualSetup, toolings: Sequence[Tooling], rng: np.random.Generator) -> Iterable[_Job]:
-    for tooling in toolings:
+def _jobs(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int) -> Iterable[_Job]:
+    rng, changes = np.random.default_rng(seed), setup.changes
+    course = course_of(setup.plan, setup.spindle, changes, len(toolings), seed)
+    for number, tooling in enumerate(toolings):
         # a child of its own for each tooling and cut, so that one more speed does not change the other records
         chance = rng.spawn(1)[0]
         clamping = clamp(setup.sensors, tooling.cutter.tooth_angle, chance)
+        chances = chance.spawn(len(setup.plan.cuts))
         small = reduced(rotor(setup.spindle, tooling.assembly))
         dynamics = None if setup.spindle.speed_dependent else poles(small)
-        for name, speed, last, duration in setup.plan.cuts:
+        for turn in (each for each in course if each.tooling == number):
+            name, speed, last, duration = setup.plan.cuts[turn.cut]
+            if changes.of_the_machine:
+                small, dynamics = reduced(rotor(_in_cut(setup, tooling, turn, seed), tooling.assembly)), None
             own = _along(small, speed, last, setup.plan.settling / duration) if dynamics is None else dynamics
             own = _with(setup.workpiece_side, own)
             conditions = setup.plan.conditions(speed)
-            yield _Job(f"{tooling.name}-{name}", tooling, own, clamping, conditions, last, duration, chance.spawn(1)[0])
+            yield _Job(f"{tooling.name}-{name}", tooling, own, clamping, conditions, last, duration, chances[turn.cut])
+
+
+def _in_cut(setup: VirtualSetup, tooling: Tooling, turn: Turn, seed: int) -> VirtualSpindle:
+    """The spindle as it is in one cut; how far its joint gives way there is that of the tool that does not vibrate."""
+    changes, spindle = setup.changes, setup.spindle
+    if changes.joint is None:
+        return changed(spindle, changes, turn, 0.0)
+    clamping = changes.joint.reclamping * float(np.random.default_rng([seed, 78, turn.tooling]).normal())
+    still = changed(spindle, changes, turn, clamping)
+    speed = setup.plan.cuts[turn.cut][1]
+    lines = rigid_force_lines(tooling.cutter, setup.plan.conditions(speed), setup.workpiece.coefficients, law=changes.chip_law)
+    highest = int(2.0 * np.pi * TRUTH_FREQUENCIES[1] / speed)
+    face = {"face": tooling.assembly.stickout + tooling.assembly.holder_length}
+    motion = frequency_response(
+        rotor(still, tooling.assembly, points=face),
+        speed * np.arange(1, highest + 1),
+        speed,
+        outputs=("face.x", "face.y", "flange.x", "flange.y"),
+    )
+    across = np.einsum("nij,nj->ni", motion[:, :2] - motion[:, 2:], lines[1 : highest + 1, :2])
+    return changed(spindle, changes, turn, clamping, float(np.linalg.norm(across)))
 
 
 def _along(small: ReducedRotor, speed: float, last: float | None, settling: float) -> Poles | tuple[Poles, ...]:
@@ -233,7 +264,8 @@ class _Worker:
                 way = speed * step * np.arange(total) + 0.5 * change * np.maximum(step * (np.arange(total) - first), 0.0) ** 2
                 course = Course(angle, feed * way, _width(plan, job.duration, step, total, first))
                 coefficients = self.setup.workpiece.coefficients
-                history = mill_cut(job.dynamics, cutter, conditions, coefficients, step, total, course=course).after(settling)
+                law = self.setup.changes.chip_law
+                history = mill_cut(job.dynamics, cutter, conditions, coefficients, step, total, course=course, law=law).after(settling)
                 highest = int(2.0 * np.pi * TRUTH_FREQUENCIES[1] / speed)
                 lines = _lines(plan, history, lead, highest + 1)
             own = suite, job.clamping, angle[inside], job.conditions.feed_angle, OVERSAMPLING, history, job.rng, disturbances

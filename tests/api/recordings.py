@@ -39,6 +39,8 @@ def declared(cuts: int = 1, suffix: str = ".h5", **changed: Any) -> dict[str, An
         for place, quantity in (("flange", Quantity.DISPLACEMENT), ("fixture", Quantity.ACCELERATION))
         for axis in "xy"
     }
+    for axis in "xy":
+        sensors[f"flange_{axis}"] |= {"distance_behind_flange_mm": 0.0, "distance_spread_mm": 0.0}
     conditions = {
         "tooling": "T1", "spindle_speed_rpm": RPM, "axial_depth_mm": 0.4, "feed_per_tooth_mm": 0.1,
         "entry_angle_deg": 90.0, "exit_angle_deg": 180.0, "feed_direction": "+X",

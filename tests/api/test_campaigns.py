@@ -51,7 +51,8 @@ def test_a_campaign_from_making_to_forgetting(client, machine):
     assert (made.name, made.machine, made.usable, made.toolings) == ("by hand", machine, 0, ["T1"])
     assert made.too_few == too_few([])
     assert made.sampling_rate_hz == 25600.0
-    assert made.sensors["flange_x"] == {"quantity": "displacement", "axis": "X", "sensitivity": 1.0e4}
+    looks = {"distance_behind_flange_mm": 0.0, "distance_spread_mm": 0.0}
+    assert made.sensors["flange_x"] == {"quantity": "displacement", "axis": "X", "sensitivity": 1.0e4, **looks}
     assert made.workpiece["radial_ratio"] == 0.26
     first = made.cuts[0]
     assert (first.id, first.cut.name, first.cut.uploaded, first.air.name, first.verdict) == ("c0", "c0_cut.h5", False, "c0_air.h5", None)
@@ -379,6 +380,7 @@ def test_texts_of_campaigns_come_back_as_they_were():
     # turned back by its fellow
     data["sensors"]["felt_x"]["rotation_deg"] = 2.0
     data["sensors"]["felt_y"] = data["sensors"]["felt_x"] | {"axis": "Y"}
+    data["sensors"]["flange_x"] |= {"distance_behind_flange_mm": -12.0, "distance_spread_mm": 0.5}
     name, text, cuts = declare(data, lambda _: None)
     assert (name, cuts) == ("by hand", 2)
     assert json.loads(text)["cuts"] == data["cuts"]
@@ -388,6 +390,10 @@ def test_texts_of_campaigns_come_back_as_they_were():
     felt = SensorKeys(**data["sensors"]["felt_x"]).sensor("felt_x")
     assert (felt.mount_resonance, felt.rotation) == (8e3, pytest.approx(math.radians(2.0)))
     assert SensorKeys(quantity="displacement", axis="X").sensor("x").rotation == 0.0
+    assert SensorKeys(quantity="displacement", axis="X").sensor("x").distance is None
+    looks = SensorKeys(**data["sensors"]["flange_x"]).sensor("flange_x")
+    assert (looks.distance, looks.distance_spread) == pytest.approx((-0.012, 5e-4))
+    assert looks in campaign.sensors
     assert campaign.cuts[1].air == Path("/x/c1_air.h5")
     toml = tomllib.loads(toml_text(text))
     assert toml["sensors"] == data["sensors"]

@@ -225,7 +225,8 @@ def test_a_wrong_cutting_coefficient_is_found(shop, clamped_cuts, clamped):
     assert std < 0.02
     ratio, std = clamped.coefficients[ForceCoefficient(ForceTerm.RATIO)]
     assert ratio == pytest.approx(0.0, abs=3.0 * std)
-    assert std < 0.01
+    # bands count what may act beside the model in so far as the lines speak for it
+    assert std < 0.02
     # the smooth errors behind them have no name
     assert tuple(clamped.coefficients) == clamped_cuts[0].coefficients
     assert max(tip_errors(shop, clamped).values()) < 0.03

@@ -21,6 +21,10 @@ MEASURED = {
 }
 
 
+#: A sensor that looks at the flange itself, others behind it and in front of it, at the holder: distance over the lever, side.
+AT_FLANGE, BEHIND, IN_FRONT = (0.0, 0.0), (0.3, 0.0), (-0.2, 1.0)
+
+
 def relative_speed(omega):
     """Some speed for each line."""
     return np.cos(np.arange(omega.size))
@@ -32,7 +36,7 @@ def hit(omega):
     return (place % 2).astype(float), (place % 3 > 0).astype(float)
 
 
-def cross(candidate, omega, flange, tip, measured="flange", gradient=False, x=None, hammer=None):
+def cross(candidate, omega, flange, tip, measured="flange", gradient=False, x=None, hammer=None, seen=AT_FLANGE):
     """Values (n, o), and with `gradient` their change with each unknown (n, o, p)."""
     omega_n, psi, factor, softening, residual, joint = candidate
     shares = MEASURED[measured]
@@ -42,16 +46,18 @@ def cross(candidate, omega, flange, tip, measured="flange", gradient=False, x=No
     own, still = (np.ones(n), np.zeros(n)) if hammer is None else hit(omega)
     points = np.column_stack([omega, relative_speed(omega) if x is None else np.full(n, x), own, still])
     of_point = np.zeros((n, 3)) if hammer is None else hammer * (1.0 - own)[:, None]
-    values, kept = kernels.cross_frf(
-        omega_n, shapes, factor, softening, joint, shares, points, np.concatenate([flange, tip, of_point], axis=1)
+    values, kept, turned = kernels.cross_frf(
+        omega_n, shapes, factor, softening, joint, (shares, np.array(seen)), points, np.concatenate([flange, tip, of_point], axis=1)
     )
+    if gradient == "turned":
+        return turned
     if not gradient:
         return values
     pairs = m * (m + 1) // 2
     size = 3 * m + pairs + 3 + joint.size + (m + 2) * places + pairs * (softening.size > 0)
     rows = np.empty((size, 2 * n * outputs))
     weight = np.ones((n, outputs), dtype=complex)
-    kernels.cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, weight, np.ones(size), rows)
+    kernels.cross_frf_gradient(omega_n, factor, softening, joint, (shares, np.array(seen)), points, kept, weight, np.ones(size), rows)
     return values, as_columns(rows, n, outputs)
 
 
@@ -59,9 +65,9 @@ def as_columns(rows, n, outputs):
     return (rows[:, : n * outputs] + 1j * rows[:, n * outputs :]).T.reshape(n, outputs, -1)
 
 
-def coupled(candidate, holder, x):
-    """Gap and fixture by the room of couplings, from complex modes of the machine as it is at speed x, shape (n, 2)."""
-    omega_n, psi, factor, softening, residual, joint = candidate
+def machine_of(candidate, omega, x):
+    """Receptance of flange and fixture from complex modes of the machine as it is at speed x."""
+    omega_n, psi, factor, softening, residual, _ = candidate
     stiffness = np.diag(omega_n**2)
     if softening.size:
         stiffness = stiffness + x * softening * np.outer(omega_n, omega_n)
@@ -75,10 +81,23 @@ def coupled(candidate, holder, x):
     modes = damped_modes(
         np.sqrt(squares), turn.T @ factor @ factor.T @ turn, turn.T @ psi * lever, compliance * np.outer(lever, lever), points
     )
-    spindle = modes.receptance(holder.omega)
+    return modes.receptance(omega)
+
+
+def flange_of(candidate, omega, x):
+    """That of the flange alone."""
+    return machine_of(candidate, omega, x).block(plane("flange"))
+
+
+def coupled(candidate, holder, x, seen=AT_FLANGE):
+    """Gap and fixture by the room of couplings at speed x, shape (n, 2)."""
+    joint, spindle = candidate[-1], machine_of(candidate, holder.omega, x)
     flange = couple(holder, spindle, lumped(joint))["spindle", "tip"][:, :, :1]
     # the force in the joint moves both
     force = np.linalg.solve(spindle["flange", "flange"], flange)
+    if seen[1]:
+        flange = flange + lumped(joint).compliance_along(holder.omega, (Dof.X, Dof.SLOPE_X))[:, :, None] * force
+    flange[:, 0] += seen[0] * LEVER * flange[:, 1]
     fixture = (spindle["fixture", "flange"] @ force)[:, 0, 0]
     return np.stack([flange[:, 0, 0] - fixture, fixture], axis=1)
 
@@ -94,6 +113,13 @@ def test_cross_frf_is_that_of_coupled_complex_modes(m, soft):
         expected = coupled(chosen, holder, x)
         both = cross(chosen, omega, flange, tip, "gap and fixture", x=x)
         np.testing.assert_allclose(both, expected, rtol=1e-7, atol=1e-11 * np.abs(expected).max())
+        for seen in (BEHIND, IN_FRONT):
+            looked = coupled(chosen, holder, x, seen)
+            found = cross(chosen, omega, flange, tip, "gap and fixture", x=x, seen=seen)
+            np.testing.assert_allclose(found, looked, rtol=1e-7, atol=1e-11 * np.abs(looked).max())
+            joined = couple(holder, flange_of(chosen, omega, x), lumped(chosen[-1]), {Dof.X: seen[0] * LEVER})
+            alone = joined.between("spindle.x", "tip.x")
+            np.testing.assert_allclose(found.sum(axis=1), alone, rtol=1e-7, atol=1e-11 * np.abs(alone).max())
         # one output is what two of them add up to
         one = cross(chosen, omega, flange, tip, x=x)
         np.testing.assert_allclose(one[:, 0], both.sum(axis=1), rtol=1e-10, atol=1e-12 * np.abs(one).max())
@@ -133,13 +159,15 @@ def test_nothing_softens_at_the_middle_speed():
     np.testing.assert_allclose(kept, found[1][1], rtol=1e-9, atol=1e-14 * np.abs(kept).max())
 
 
+@pytest.mark.parametrize("seen", [AT_FLANGE, BEHIND, IN_FRONT])
 @pytest.mark.parametrize("stands", [False, True])
 @pytest.mark.parametrize("soft", [False, True])
 @pytest.mark.parametrize("measured", MEASURED)
-def test_cross_frf_gradient_against_differences(measured, soft, stands):
+def test_cross_frf_gradient_against_differences(measured, soft, stands, seen):
     outputs, places = MEASURED[measured].shape[0], MEASURED[measured].shape[1] - 1
     rng = np.random.default_rng(5)
     m = 3
+    side = {"seen": seen}
     omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 11)
     _, flange, tip = substructure(rng, omega)
     omega_n, psi, factor, softening, residual, joint = chosen = candidate(rng, m, soft, max(places, 1))
@@ -147,8 +175,8 @@ def test_cross_frf_gradient_against_differences(measured, soft, stands):
     if stands:
         hammer, still = 1e-8 * (rng.standard_normal((11, 3)) + 1j * rng.standard_normal((11, 3))), [np.array([0.03, -0.2])]
         chosen = (*chosen[:-1], np.concatenate([joint, *still]))
-    values, gradient = cross(chosen, omega, flange, tip, measured, gradient=True, hammer=hammer)
-    np.testing.assert_array_equal(values, cross(chosen, omega, flange, tip, measured, hammer=hammer))
+    values, gradient = cross(chosen, omega, flange, tip, measured, gradient=True, hammer=hammer, **side)
+    np.testing.assert_array_equal(values, cross(chosen, omega, flange, tip, measured, hammer=hammer, **side))
     lower = np.tril_indices(m)
     compliance = (residual[:2] @ residual[:2].T)[np.tril_indices(2)]
     parts = [np.log(omega_n), psi[:, :2].ravel(), factor[lower], compliance]
@@ -175,7 +203,7 @@ def test_cross_frf_gradient_against_differences(measured, soft, stands):
             symmetric.T[lower] = each[-2]
         last = np.concatenate([each[-1], *([each[-2 - soft]] if stands else [])])
         changed = np.exp(each[0]), changed_psi, changed_factor, symmetric, changed_residual, last
-        return cross(changed, omega, flange, tip, measured, hammer=hammer)
+        return cross(changed, omega, flange, tip, measured, hammer=hammer, **side)
 
     np.testing.assert_allclose(at(flat), values, rtol=1e-10)
     assert gradient.shape == (11, outputs, flat.size)
@@ -186,6 +214,19 @@ def test_cross_frf_gradient_against_differences(measured, soft, stands):
         for o in range(outputs):
             size = max(np.abs(difference[:, o]).max(), 1e-7 * np.abs(values).max() / abs(flat[k]))
             assert np.abs(gradient[:, o, k] - difference[:, o]).max() < 1e-5 * size, (k, o)
+
+
+@pytest.mark.parametrize("seen", [AT_FLANGE, BEHIND, IN_FRONT])
+def test_the_slope_is_the_change_with_the_distance(seen):
+    rng = np.random.default_rng(6)
+    omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 11)
+    _, flange, tip = substructure(rng, omega)
+    chosen = candidate(rng, 3, True)
+    near, far = (cross(chosen, omega, flange, tip, "gap and fixture", seen=(seen[0] + d, seen[1])) for d in (-1e-3, 1e-3))
+    slope = cross(chosen, omega, flange, tip, "gap and fixture", "turned", seen=seen)
+    np.testing.assert_allclose((far - near)[:, 0] / 2e-3, slope, rtol=1e-8)
+    # of the fixture nothing depends on it
+    np.testing.assert_array_equal(far[:, 1], near[:, 1])
 
 
 def test_blocks_of_frequencies_are_independent():
@@ -218,16 +259,16 @@ def test_tool_holder_rows_weights_and_scales(measured):
     def at(blocks):
         here = np.column_stack([blocks, -blocks[:, 3:5]])
         here[:, 5:] *= (1.0 - own)[:, None]
-        return kernels.cross_frf(omega_n, shapes, factor, softening, joint, shares, points, here)
+        return kernels.cross_frf(omega_n, shapes, factor, softening, joint, (shares, np.array(IN_FRONT)), points, here)
 
     blocks = np.column_stack([flange, tip, direct])
-    _, kept = at(blocks)
+    _, kept, _ = at(blocks)
     size = 6 + 3 + 3 + 4 + 4 * (outputs - 1)
     weight, scale = rng.standard_normal((7, outputs)) + 1j * rng.standard_normal((7, outputs)), rng.standard_normal(size)
     rows, plain = np.empty((size + 6, 14 * outputs)), np.empty((size, 14 * outputs))
-    kernels.cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, weight, scale, rows)
+    kernels.cross_frf_gradient(omega_n, factor, softening, joint, (shares, np.array(IN_FRONT)), points, kept, weight, scale, rows)
     ones = np.ones((7, outputs), dtype=complex)
-    kernels.cross_frf_gradient(omega_n, factor, softening, joint, shares, points, kept, ones, np.ones(size), plain)
+    kernels.cross_frf_gradient(omega_n, factor, softening, joint, (shares, np.array(IN_FRONT)), points, kept, ones, np.ones(size), plain)
     found, unweighted = as_columns(rows, 7, outputs), as_columns(plain, 7, outputs)
     expected = unweighted * weight[:, :, None] * scale
     np.testing.assert_allclose(found[:, :, :size], expected, rtol=1e-10, atol=1e-13 * np.abs(expected).max())
@@ -251,7 +292,7 @@ def test_compiled_and_plain_agree(monkeypatch):
         for measured in ("flange", "gap and fixture", "housing"):
             for each in (soft, (*soft[:3], np.zeros((0, 0)), *soft[4:])):
                 results.append(cross(each, omega, flange, tip, measured, gradient=True))
-            results.append(cross(stands, omega, flange, tip, measured, gradient=True, hammer=hammer))
+            results.append(cross(stands, omega, flange, tip, measured, gradient=True, hammer=hammer, seen=IN_FRONT))
         for name, function in list(vars(kernels).items()):
             if hasattr(function, "py_func"):
                 monkeypatch.setattr(kernels, name, function.py_func)

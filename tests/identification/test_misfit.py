@@ -7,6 +7,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import DELAY_UNIT, Misfit, Residual
 from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.rough_data import with_distances
 from tests.identification.models import vector_of
 
 FREQUENCIES = ((600.0, 1400.0, 2500.0), (900.0, 2100.0))
@@ -59,7 +60,8 @@ def dense(misfit, theta, layout, nuisance):
 def case(request, few, rich, rough):
     if request.param == "plain":
         return Case(few, flange_layout(3, 2), "plain")
-    data = rich if request.param == "all" else rough
+    # one sensor looks behind the flange, one at the holder, and nobody knows where exactly
+    data = with_distances(rich, np.array([0.03, -0.02]), np.array([0.02, 0.005])) if request.param == "all" else rough
     layout = Layout((AxisLayout(3, 1, True), AxisLayout(2, 1, True)), len(data.coefficient_spread), data.clampings)
     return Case(data, layout, request.param)
 
@@ -116,6 +118,8 @@ def test_scales_of_the_force_are_factors_of_the_lines(case):
         return
     without = np.array(case.theta)
     kept = case.layout.force.start + np.arange(case.misfit.data.rough_place.start, case.misfit.data.rough_place.stop)
+    # where a sensor looks is no factor
+    kept = np.append(kept, [case.layout.force.start + place for place in case.misfit.data.distance_place.values()]).astype(int)
     without[np.setdiff1d(np.arange(case.layout.force.start, case.layout.force.stop), kept)] = 0.0
     plainly = case.misfit.evaluate(without, case.layout, case.here.nuisance).models
     for axis, model, bare in zip(case.misfit.data.axes, case.here.models, plainly, strict=True):
@@ -129,6 +133,22 @@ def test_scales_of_the_force_are_factors_of_the_lines(case):
             place = case.misfit.data.rough_place
             assert not np.any(slope[:, place])
         np.testing.assert_allclose(model, (factor * np.exp(slope @ logs))[:, None] * bare, rtol=1e-10)
+
+
+def test_where_a_sensor_looks_is_what_was_told_and_what_is_left_of_it(rich):
+    data = with_distances(rich, np.array([0.03, -0.02]), np.array([0.02, 0.0]))
+    count = len(rich.coefficient_spread)
+    assert data.distance_place == {Dof.X: count, Dof.Y: count + 1}
+    # of one that is told as exact next to nothing is left
+    assert data.coefficient_spread[count:] == pytest.approx((0.2, 1e-4))
+    misfit = Misfit(data, Priors(), SHARES)
+    layout = Layout((AxisLayout(3, 1), AxisLayout(2, 1)), count + 2, data.clampings)
+    theta = vector_of(layout, FREQUENCIES)
+    theta[layout.force][count:] = [-0.1, 0.01]
+    np.testing.assert_allclose([misfit.seen_at(i, theta, layout) for i in (0, 1)], [[0.2, 0.0], [-0.19, 1.0]])
+    # a search that has no such unknown believes what was told
+    plain = Layout(layout.axes, 0, 0)
+    np.testing.assert_allclose(misfit.seen_at(0, np.zeros(plain.size), plain), [0.3, 0.0])
 
 
 def test_gradient_is_the_dense_one_with_the_cuts_eliminated(case):

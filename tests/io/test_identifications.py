@@ -190,6 +190,17 @@ def test_a_broken_speed_band_is_not_read(path, found, key, value, words):
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize("looks", [{}, {"distance": 0.0, "distance_spread": 0.0}, {"distance": -0.0125, "distance_spread": 2e-3}])
+def test_sensors_come_back_with_where_they_look(tmp_path, found, looks):
+    campaign = by_hand.campaign(tmp_path)
+    gap = Sensor("gap_y", Quantity.DISPLACEMENT, Dof.Y, 2.0, **looks)
+    told = replace(campaign, sensors=(*campaign.sensors, gap))
+    write_result(tmp_path / "S.json", identification_to_json(replace(found, sensors=told.sensors), told, []))
+    read = machine_from_json(read_result(tmp_path / "S.json"), "S.json")
+    (again,) = (sensor for sensor in read.sensors if sensor.name == "gap_y")
+    assert (again.distance, again.distance_spread) == (pytest.approx(gap.distance), pytest.approx(gap.distance_spread))
+
+
 def test_sensors_come_back_with_role_and_mount(tmp_path, found):
     campaign = by_hand.campaign(tmp_path)
     felt = Sensor("felt_x", Quantity.ACCELERATION, Dof.X, 2.0, 1e-5, 9e3, role=Role.SPINDLE, mount_resonance=8e3, rotation=-0.03)

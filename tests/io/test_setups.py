@@ -361,6 +361,39 @@ def test_a_sensor_that_is_turned_needs_its_neighbour(campaign, campaign_text):
         read_campaign(campaign)
 
 
+def test_how_far_behind_the_flange_a_sensor_looks(campaign, campaign_text):
+    path = campaign / "campaign.toml"
+
+    def gap(*lines):
+        path.write_text(campaign_text.replace("[sensors.flange_x]\n", "\n".join(["[sensors.flange_x]", *lines, ""])))
+        (found,) = (each for each in read_campaign(campaign).sensors if each.quantity is Quantity.DISPLACEMENT)
+        return found.distance, found.distance_spread
+
+    assert gap() == (None, 1e-3)
+    assert gap("distance_behind_flange_mm = 12.5") == pytest.approx((0.0125, 1e-3))
+    assert gap("distance_behind_flange_mm = -8.0", "distance_spread_mm = 0.2") == pytest.approx((-0.008, 2e-4))
+    assert gap("distance_behind_flange_mm = 0.0", "distance_spread_mm = 0.0") == (0.0, 0.0)
+    for key, value in (
+        ("distance_behind_flange_mm", "301.0"),
+        ("distance_behind_flange_mm", "-101.0"),
+        ("distance_behind_flange_mm", "nan"),
+        ("distance_behind_flange_mm", '"12"'),
+        ("distance_spread_mm", "-1.0"),
+        ("distance_spread_mm", "101.0"),
+    ):
+        with pytest.raises(InputError, match=rf"sensors\.flange_x\.{key}"):
+            gap(f"{key} = {value}")
+
+
+@pytest.mark.parametrize("key", ["distance_behind_flange_mm", "distance_spread_mm"])
+def test_only_a_displacement_sensor_looks_somewhere(campaign, campaign_text, key):
+    path = campaign / "campaign.toml"
+    for name in ("fixture_x", "trigger"):
+        path.write_text(campaign_text.replace(f"[sensors.{name}]\n", f"[sensors.{name}]\n{key} = 1.0\n"))
+        with pytest.raises(InputError, match=rf"{name}.*{key}|{key}.*{name}"):
+            read_campaign(campaign)
+
+
 def test_what_an_accelerometer_is_fixed_to(campaign, campaign_text):
     text = campaign_text.replace(
         "[sensors.trigger]", '[sensors.other_x]\nquantity = "acceleration"\naxis = "X"\nsensitivity = 1.0\n[sensors.trigger]'

@@ -118,3 +118,20 @@ def test_what_cannot_be_turned_back_is_refused(sensors, words):
 def test_only_motion_has_a_direction():
     with pytest.raises(InputError, match=r"force_x.rotation_deg: found 2, allowed is none of a force sensor"):
         Sensor("force_x", Quantity.FORCE, Dof.X, rotation=np.radians(2.0))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "looks", "field"),
+    [
+        (Quantity.DISPLACEMENT, {"distance": 0.31}, "distance"),
+        (Quantity.DISPLACEMENT, {"distance": -0.11}, "distance"),
+        (Quantity.DISPLACEMENT, {"distance": np.nan}, "distance"),
+        (Quantity.DISPLACEMENT, {"distance_spread": 0.11}, "distance_spread"),
+        (Quantity.DISPLACEMENT, {"distance_spread": np.nan}, "distance_spread"),
+        (Quantity.ACCELERATION, {"distance": 0.0}, "distance"),
+        (Quantity.FORCE, {"distance": 0.01}, "distance"),
+    ],
+)
+def test_a_displacement_sensor_alone_looks_somewhere_near_the_flange(quantity, looks, field):
+    with pytest.raises(InputError, match=rf"sensors\.s\.{field}: "):
+        Sensor("s", quantity, Dof.X, **looks)

@@ -38,7 +38,7 @@ def test_march_is_exact_for_a_force_that_is_linear_in_each_step(axial):
     # one level of an edge: no lag, no offset
     edge = np.array([0.0, 0.0, *((0.8, 0.6) if axial else (1.0, 0.0)), width, DOWN.entry, DOWN.exit, 0.0])
     tooth = 0.5 * np.pi * np.arange(4), np.tile(edge, (4, 1, 1))
-    cut = np.array([0.0, speed * STEP, 8e8, 2.4e8, 1e8, 8e3, 6e3, 1e3])
+    cut = np.array([0.0, speed * STEP, 8e8, 2.4e8, 1e8, 8e3, 6e3, 1e3, 0.0, 0.0])
     instants = np.arange(1200)
     course = np.column_stack([1.4 + speed * STEP * instants, 2e-7 * instants, np.full(1200, 0.9)])
     force = np.zeros((1200, 3))
@@ -91,7 +91,8 @@ def test_a_force_is_that_of_edges_along_their_own_axes(seed, unlike):
     path = np.cumsum(rng.normal(0.0, 1e-5, (50, 3)), axis=0)
     tooth, position = rng.uniform(0.0, 2.0 * np.pi, 3), path[-1, :2] + [1e-4, 5e-5]
     places, before = rng.uniform(-20.0, 48.0, (3, 6 if unlike else 3)), 3e-6
-    cut = np.array([rng.uniform(0.0, 7.0), 0.15, *rng.uniform(1e8, 5e8, 3), *rng.uniform(1e3, 5e3, 3)])
+    curve = ((0.0, 0.0), (-0.25, 2e4))[seed // 6]
+    cut = np.array([rng.uniform(0.0, 7.0), 0.15, *rng.uniform(1e8, 5e8, 3), *rng.uniform(1e3, 5e3, 3), *curve])
     force, wanted = np.full(3, 9.0), np.zeros(3)
     kernels.cut_force(position, tooth, edges, places, cut, before, path, force)
     for j in range(3):
@@ -106,7 +107,8 @@ def test_a_force_is_that_of_edges_along_their_own_axes(seed, unlike):
                 ways.append((position - there) @ outward + offset - edges[(j + 1 + m) % 3, k, 1])
             if min(ways) > 0.0:
                 along, normal = np.array([-outward[1], outward[0], 0.0]), np.array([*(sine * outward), -cosine])
-                strength = width * inside / (2.0 * half) * (cut[2:5] * min(ways) * sine + cut[5:8])
+                chip = min(ways) * sine
+                strength = width * inside / (2.0 * half) * (cut[2:5] * chip * (chip * curve[1] if curve[1] else 1.0) ** curve[0] + cut[5:8])
                 wanted += strength[0] * along - strength[1] * normal + strength[2] * np.cross(along, normal)
     assert force == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 

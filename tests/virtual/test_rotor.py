@@ -5,7 +5,7 @@ import pytest
 
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
-from rcsa_ident.dynamics.coordinates import plane
+from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
@@ -49,6 +49,39 @@ def test_agrees_with_receptance_coupling(hpm, machines_folder, name):
     joined = couple(tool_holder_receptance(assembly, BAND), Receptance(BAND, flange, plane("flange"), plane("flange")), joint)
     assert distance(joined.between("tip.x", "tip.x"), whole[:, 0, 0]) < 3e-3
     assert distance(joined.between("spindle.x", "tip.x"), whole[:, 1, 0]) < 3e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("behind", "close"), [(0.03, 0.03), (0.015, 0.015), (-0.01, 0.01), (-0.02, 0.02)])
+def test_what_is_seen_beside_the_flange_is_nearly_its_motion_and_slope(hpm, machines_folder, behind, close):
+    # what bends and shears on the way is left; it halves with the distance
+    for name in ("S1-ER32", "S4-shrink"):
+        assembly, below = read_tooling(machines_folder / "toolings" / f"{name}.toml").assembly, BAND[::2][:60]
+        model = rotor(dataclasses.replace(hpm.spindle, seen_at=behind), assembly)
+        seen, flange = frequency_response(model, below, outputs=("seen.x", "flange.x"), inputs=("tip.x",))[:, :, 0].T
+        ports = ("flange.x", "flange.x'")
+        alone = frequency_response(rotor(hpm.spindle, None), below, inputs=ports, outputs=ports)
+        joint = LumpedJoint(**dataclasses.asdict(hpm.spindle.joint))
+        bare = Receptance(below, alone, plane("flange"), plane("flange"))
+        joined = couple(tool_holder_receptance(assembly, below), bare, joint, {Dof.X: behind})
+        assert distance(joined.between("spindle.x", "tip.x"), seen) < close
+        assert distance(flange, seen) > 5.0 * close
+
+
+def test_what_is_seen_at_the_holder_does_not_jump_from_node_to_node(hpm, tooling):
+    places = (-0.0201, -0.02, -0.0199)
+    spindles = [dataclasses.replace(hpm.spindle, seen_at=z) for z in places]
+    a, b, c = (frequency_response(rotor(s, tooling.assembly), BAND[:3], outputs=("seen.x",), inputs=("tip.x",))[:, 0, 0] for s in spindles)
+    np.testing.assert_allclose(b, 0.5 * (a + c), rtol=1e-9)
+    assert np.all(np.abs(a - b) > 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("behind", [0.03, -0.02])
+def test_what_is_seen_changes_little_with_the_mesh(hpm, tooling, behind):
+    spindle = dataclasses.replace(hpm.spindle, seen_at=behind)
+    coarse, fine = (frequency_response(rotor(spindle, tooling.assembly, r), BAND, outputs=("seen.x",)) for r in (1, 2))
+    assert distance(coarse, fine) < 2e-3
 
 
 def test_is_reciprocal_and_its_planes_apart(model):

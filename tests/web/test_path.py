@@ -228,9 +228,15 @@ def test_cuts_described_by_hand(opened, client: Client, served: Served, shop: st
     page.get_by_label("First speed").fill("8000")
     page.get_by_label("Step", exact=True).fill("308")
     expect(page.get_by_label("Speed of S1-ER32-01")).to_have_value("8308")
+    # where a displacement sensor looks, and no accelerometer
+    page.get_by_label("Behind the flange").nth(0).fill("-12.5")
+    expect(page.get_by_label("Behind the flange").nth(2)).to_be_disabled()
     page.get_by_role("button", name="Make the campaign").click()
     expect(page.get_by_text("4 of 4", exact=True)).to_be_visible(timeout=60_000)
     campaign = client.send("GET", f"/campaigns/{page.url.rsplit('/', 1)[1]}").json()
     assert [cut["spindle_speed_rpm"] for cut in campaign["cuts"]] == [8000.0, 8308.0]
     assert campaign["cuts"][0]["entry_angle_deg"] == pytest.approx(90.0)
+    assert campaign["sensors"]["flange_x"]["distance_behind_flange_mm"] == -12.5
+    assert "distance_behind_flange_mm" not in campaign["sensors"]["flange_y"]
+    assert any("how far behind the flange flange_y looks" in remark for remark in campaign["remarks"])
     assert json.dumps(campaign["cuts"][1]["air"]) == '{"name": "S1-ER32-01_air.h5", "uploaded": true}'

@@ -26,7 +26,7 @@ export function wordsOf(job) {
 
 export const kindOf = (job) =>
   job.state === "done"
-    ? ({ converged: "good", suspect: "doubt", failed: "bad" }[job.status] ?? "good")
+    ? ({ converged: "good", "not validated": "doubt", suspect: "doubt", failed: "bad" }[job.status] ?? "good")
     : ({ failed: "bad", cancelled: "idle" }[job.state] ?? "busy");
 
 export const shareOf = (job) => (job.progress?.total ? job.progress.done / job.progress.total : null);

@@ -17,7 +17,8 @@ class MachineArrays(NamedTuple):
     """A machine as the kernel reads it.
 
     omega_n (m,); psi (m, 6): flange t, r in X and in Y, fixture x, y; factor (m, m) lower triangular; softening (m, m) or (0, 0);
-    skew (m, m) or (0, 0); residual (4, 4) lower triangular factor; fixture_residual (2, 4); joint (4,): k_t, k_r, c_t, c_r.
+    skew (m, m) or (0, 0); residual (4, 4) lower triangular factor; fixture_residual (2, 4); joint (4,): k_t, k_r, c_t, c_r;
+    seen (2, 2): of X and Y, the flange sensor's distance behind the joint and 1 where it looks at the holder.
     """
 
     omega_n: np.ndarray
@@ -28,6 +29,7 @@ class MachineArrays(NamedTuple):
     residual: np.ndarray
     fixture_residual: np.ndarray
     joint: np.ndarray
+    seen: np.ndarray
 
 
 class PointArrays(NamedTuple):
@@ -87,13 +89,15 @@ class PosedPoints(NamedTuple):
 
 class LineArrays(NamedTuple):
     """What a kernel fills for one axis: (n, o, f) displacement by each force, X and Y, of a robot Z, too [m]; (n, o, q) its gradient, or
-    (0, o, q); (n, o, 4) v and (n, 4) x, with which a change dB of the flange's receptance moves it by v^T dB x, or (0, o, 4) and (0, 4).
+    (0, o, q); (n, o, 4) v and (n, 4) x, with which a change dB of the flange's receptance moves it by v^T dB x, or (0, o, 4) and (0, 4);
+    (n,) the slope that the flange's sensor sees, or (0,).
     """
 
     parts: np.ndarray
     gradient: np.ndarray
     felt: np.ndarray
     moved: np.ndarray
+    turned: np.ndarray
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -182,15 +186,15 @@ def _lower(row, k, scale, ends, through):
 def coupled_lines(machine, points, lines_x, lines_y):
     """Fill the lines of both axes: displacement of flange, or of gap and fixture, per force in X and in Y, and its gradient.
 
-    B = Psi^T Z^-1 Psi + R R^T, Z = K - w^2 + i w (L L^T + W G), E = A22 + K_joint^-1 + B; an output whose row is b (the flange's own,
-    or the fixture's, or their difference) answers b x with x = E^-1 A21 F. With y = E^-T b^T, v = the row's share of the flange - y
+    B = Psi^T Z^-1 Psi + R R^T, Z = K - w^2 + i w (L L^T + W G), E = A22 + K_joint^-1 + B; an output of row b (what the flange's sensor
+    sees, the fixture's, or their difference) answers b x with x = E^-1 A21 F. With y = E^-T b^T, v = the row's share of the flange - y
     and p = Z^-T (Psi v + the row's share of the fixture), q = Z^-1 Psi x: d line = v^T dB x + p^T (dPsi x - dZ q) - y^T dK_joint^-1 x.
 
     The gradient's columns: log omega_n (m), psi's first four columns by rows (4 m), factor's lower triangle by rows, residual's lower
     triangle by rows (10), with two outputs psi's last two columns by rows (2 m) and the fixture's residual (8), with softening its
     lower triangle by rows, with skew its entries above the diagonal by rows, joint (4).
     """
-    omega_n, psi, factor, softening, skew, residual, fixture_residual, joint = machine
+    omega_n, psi, factor, softening, skew, residual, fixture_residual, joint, seen = machine
     m = omega_n.size
     linear = lines_x.gradient.shape[0] > 0 or lines_y.gradient.shape[0] > 0
     # the fixture's two columns are felt where its motion is an output of its own
@@ -221,8 +225,7 @@ def coupled_lines(machine, points, lines_x, lines_y):
                 if turns:
                     d_ij += speed * skew[i, j]
                 dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * d_ij)
-            for a in range(sides):
-                right[i, a] = psi[i, a]
+        right[:] = psi[:, :sides]
         factorise(dynamic)
         if turns and linear:
             left[:] = right
@@ -237,17 +240,13 @@ def coupled_lines(machine, points, lines_x, lines_y):
                     total += psi[i, a] * right[i, c]
                 block[a, c] = total
         k_t, k_r = 1.0 / complex(joint[0], w * joint[2]), 1.0 / complex(joint[1], w * joint[3])
+        together[:] = points.flange[f] + block[:4]
         for a in range(4):
-            for c in range(4):
-                together[a, c] = points.flange[f, a, c] + block[a, c]
             together[a, a] += k_t if a % 2 == 0 else k_r
         factorise(together)
-        for a in range(4):
-            for c in range(2):
-                carried[a, c] = points.tip[f, a, c]
+        carried[:] = points.tip[f]
         solve(together, carried)
-        for a in range(4):
-            x[a] = carried[a, 0] * points.force[f, 0] + carried[a, 1] * points.force[f, 1]
+        x[:] = carried[:, 0] * points.force[f, 0] + carried[:, 1] * points.force[f, 1]
         for i in range(m):
             total = complex(0.0, 0.0)
             for c in range(4):
@@ -262,12 +261,18 @@ def coupled_lines(machine, points, lines_x, lines_y):
             felt = lines_x.felt if axis == 0 else lines_y.felt
             moved = lines_x.moved if axis == 0 else lines_y.moved
             outputs = parts.shape[1]
+            behind, front = seen[axis]
+            if gradient.shape[0] > 0:
+                slope = front * k_r * x[2 * axis + 1] + np.sum(block[2 * axis + 1] * x)
+                (lines_x if axis == 0 else lines_y).turned[row_number] = slope
             for o in range(outputs):
                 # share of flange and fixture in the output
                 flange = 1.0 if o == 0 else 0.0
                 fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
                 for c in range(4):
-                    b[c] = flange * block[2 * axis, c] + fixture * block[4 + axis, c]
+                    b[c] = flange * (block[2 * axis, c] + behind * block[2 * axis + 1, c]) + fixture * block[4 + axis, c]
+                b[2 * axis] += flange * front * k_t
+                b[2 * axis + 1] += flange * front * behind * k_r
                 for side in range(2):
                     total = complex(0.0, 0.0)
                     for c in range(4):
@@ -277,12 +282,11 @@ def coupled_lines(machine, points, lines_x, lines_y):
                     continue
                 y[:] = b
                 solve_transposed(together, column)
-                for c in range(4):
-                    v[c] = -y[c]
+                v[:] = -y
                 v[2 * axis] += flange
-                for c in range(4):
-                    felt[row_number, o, c] = v[c]
-                    moved[row_number, c] = x[c]
+                v[2 * axis + 1] += flange * behind
+                felt[row_number, o, :] = v
+                moved[row_number, :] = x
                 for i in range(m):
                     total = complex(0.0, 0.0)
                     for c in range(4):
@@ -332,6 +336,8 @@ def coupled_lines(machine, points, lines_x, lines_y):
                         for j in range(i + 1, m):
                             row[k] = turn * (p[i] * q[j] - p[j] * q[i])
                             k += 1
+                y[2 * axis] -= flange * front  # what moves with the holder moves with the joint's own flexibility
+                y[2 * axis + 1] -= flange * front * behind
                 row[k] = (y[0] * x[0] + y[2] * x[2]) * k_t * k_t
                 row[k + 1] = (y[1] * x[1] + y[3] * x[3]) * k_r * k_r
                 row[k + 2] = complex(0.0, w) * row[k]

@@ -35,6 +35,10 @@ class CoupledMisfit(Misfit):
         super().__init__(data.base, priors, model_error, cut_weight)
         self.points_data = data
 
+    def with_cut_weight(self, weight: FloatArray) -> CoupledMisfit:
+        """Return the misfit of the same data with other factors on the weights of the cuts' lines, shape (k,)."""
+        return CoupledMisfit(self.points_data, self.priors, self.model_error, weight)
+
     def prior(self, layout: Unknowns) -> PriorRows:
         """Return the priors of a layout's unknowns."""
         assert isinstance(layout, CoupledLayout)
@@ -63,6 +67,7 @@ class CoupledMisfit(Misfit):
                 machine.residual,
                 machine.fixture_residual,
                 scaled_joint(logs),
+                np.stack([self.seen_at(i, theta, layout) for i in range(2)]),
             ),
             PointArrays(
                 data.omega, data.relative_speed, data.speed, data.place, data.flange[layout.turning], data.tip[layout.turning], force
@@ -83,6 +88,9 @@ class CoupledMisfit(Misfit):
             change = np.einsum("nos,nsc->noc", parts, data.slope[at][:, :, : min(named, layout.coefficients)])
             model = parts.sum(axis=2)
             extra = np.concatenate([change, model[:, :, None] * smooth[:, None, :]], axis=2)
+            place = self.distance_place(i, layout)
+            if normal and place is not None:
+                extra[:, 0, place] = found.turned * factor
             answers.append(_CoupledAnswer(model, found.gradient, extra, compliance_of(found.felt, found.moved, factor), machine, theta))
         return answers
 
@@ -94,7 +102,7 @@ def _lines(axis: WeightedLines, layout: CoupledLayout, normal: bool) -> LineArra
     if layout.skew:
         columns += layout.modes * (layout.modes - 1) // 2
     rows = n if normal else 0
-    shapes = (n, o, 2), (rows, o, columns), (rows, o, DIRECTIONS), (rows, DIRECTIONS)
+    shapes = (n, o, 2), (rows, o, columns), (rows, o, DIRECTIONS), (rows, DIRECTIONS), (rows,)
     return LineArrays(*(np.empty(shape, dtype=complex) for shape in shapes))
 
 

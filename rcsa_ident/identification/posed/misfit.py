@@ -79,7 +79,8 @@ def _lines(axis: WeightedLines, layout: PosedLayout, normal: bool) -> LineArrays
     """Room for what the kernel says of an axis' lines."""
     n, o = axis.points.shape[0], axis.outputs
     rows = n if normal else 0
-    shapes = (n, o, 3), (rows, o, layout.tail + JOINT), (rows, o, DIRECTIONS), (rows, DIRECTIONS)
+    # a robot's flange sensors look at the flange itself
+    shapes = (n, o, 3), (rows, o, layout.tail + JOINT), (rows, o, DIRECTIONS), (rows, DIRECTIONS), (0,)
     return LineArrays(*(np.empty(shape, dtype=complex) for shape in shapes))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -113,7 +113,13 @@ class PosedRobot(Machine):
         # lines that coincide tell nothing
         return from_hz(every[np.concatenate([[True], np.diff(every) > 1e-6 * every[1:]])])
 
-    def coupled(self, tooling: Tooling | ToolAssembly, omega: FloatArray, axes: Sequence[Dof] | None = None) -> UncertainReceptance:
+    def coupled(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray,
+        axes: Sequence[Dof] | None = None,
+        behind: Mapping[Dof, float] | None = None,
+    ) -> UncertainReceptance:
         """Return the receptances of a tooling on the robot between tip and spindle, all six directions of both; see `Machine.coupled`."""
         del axes
         assembly, omega = self.fitted(tooling).assembly, frozen(omega)
@@ -121,7 +127,7 @@ class PosedRobot(Machine):
         rods = [rod_poles(assembly, float(omega[-1]), twisting).receptance(omega) for twisting in (False, True)]
         holder = Receptance.block_diagonal([in_plane(bending, Dof.X), in_plane(bending, Dof.Y), *rods])
         order = [c for point in ("tip", "flange") for c in holder.rows if c.point == point]
-        whole = couple(holder.block(order), self.flange.receptance(omega), self.joint)
+        whole = couple(holder.block(order), self.flange.receptance(omega), self.joint, behind)
         return UncertainReceptance(whole.omega, whole.values, whole.rows, whole.cols)
 
     @property

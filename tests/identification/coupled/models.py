@@ -63,7 +63,7 @@ def dense_receptance(machine, omega, x=0.0, speed=0.0):
     return np.array(found) + static
 
 
-def dense_lines(machine, joint, points):
+def dense_lines(machine, joint, points, seen=((0.0, 0.0), (0.0, 0.0))):
     """Motion of gap and fixture along X and Y by each force at the tip, shape (p, 2 axes, gap and fixture, 2 forces) [m/N].
 
     Parameters
@@ -72,14 +72,21 @@ def dense_lines(machine, joint, points):
     joint : array, shape (4,)
         k_t, k_r, c_t, c_r, the rotational ones over the lever squared.
     points : PointArrays
+    seen : for X and Y, the distance behind the joint of what the gap's sensor sees, and 1 where that is the holder
     """
     found = []
     for w, x, speed, flange, tip in zip(points.omega, points.x, points.speed, points.flange, points.tip, strict=True):
         block = dense_receptance(machine, w, x, speed)[0]
         k_t, k_r = joint[0] + 1j * w * joint[2], joint[1] + 1j * w * joint[3]
         # forces and moments in the joint under a unit force at the tip, and what they move
-        moved = block @ np.linalg.solve(flange + np.diag(1.0 / np.array([k_t, k_r, k_t, k_r])) + block[:4], tip)
-        found.append([[moved[2 * axis] - moved[4 + axis], moved[4 + axis]] for axis in range(2)])
+        gives = 1.0 / np.array([k_t, k_r, k_t, k_r])
+        carried = np.linalg.solve(flange + np.diag(gives) + block[:4], tip)
+        moved, sides = block @ carried, gives[:, None] * carried
+        own = []
+        for axis, (behind, front) in enumerate(seen):
+            t, r = (moved[k] + front * sides[k] for k in (2 * axis, 2 * axis + 1))
+            own.append([t + behind * r - moved[4 + axis], moved[4 + axis]])
+        found.append(own)
     return np.array(found)
 
 

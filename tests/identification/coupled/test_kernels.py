@@ -41,6 +41,11 @@ from tests.identification.models import vector_of
 MODES = 3
 KINDS = list(product((1, 2), (False, True), (0, EVERY_PAIR)))
 SCALE = np.array([1.0, LEVER, 1.0, LEVER])
+#: Sensors that look at the flange itself.
+NOTHING = np.zeros((2, 2))
+#: That along X behind it, that along Y in front of it, at the holder: distance over the lever, side; and the other way round.
+ELSEWHERE = np.array([[0.3, 0.0], [-0.2, 1.0]])
+SEEN = [NOTHING, ELSEWHERE, ELSEWHERE[::-1]]
 
 
 def points(count=7, seed=3, symmetric=False):
@@ -61,13 +66,13 @@ def machine_of(layout, seed=1):
     return unpack(theta, layout), scaled_joint(theta[layout.joint])
 
 
-def arrays(machine, joint):
+def arrays(machine, joint, seen=NOTHING):
     psi = np.hstack([machine.psi, machine.fixture])
     skew, fixture_residual = machine.skew, machine.fixture_residual
-    return MachineArrays(machine.omega_n, psi, machine.factor, machine.softening, skew, machine.residual, fixture_residual, joint)
+    return MachineArrays(machine.omega_n, psi, machine.factor, machine.softening, skew, machine.residual, fixture_residual, joint, seen)
 
 
-def fill(machine, joint, at, outputs, gradient=True):
+def fill(machine, joint, at, outputs, gradient=True, seen=NOTHING):
     """What the kernel says of both axes; a place that it leaves out stays NaN."""
     m = machine.order
     columns = 5 * m + m * (m + 1) // 2 + 10 + 4
@@ -76,15 +81,15 @@ def fill(machine, joint, at, outputs, gradient=True):
     for axis in range(2):
         n = int(np.sum(at.place[:, axis] >= 0))
         rows = n if gradient else 0
-        shapes = (n, outputs, 2), (rows, outputs, columns), (rows, outputs, 4), (rows, 4)
+        shapes = (n, outputs, 2), (rows, outputs, columns), (rows, outputs, 4), (rows, 4), (rows,)
         found.append(LineArrays(*(np.full(shape, np.nan, dtype=complex) for shape in shapes)))
-    coupled_lines(arrays(machine, joint), at, *found)
+    coupled_lines(arrays(machine, joint, np.ascontiguousarray(seen)), at, *found)
     return found
 
 
-def expected_lines(machine, joint, at, outputs):
+def expected_lines(machine, joint, at, outputs, seen=NOTHING):
     """The same from dense solutions, by axis: shape (n, o, 2) each."""
-    both = dense_lines(machine, joint, at) * at.force[:, None, None, :]
+    both = dense_lines(machine, joint, at, seen) * at.force[:, None, None, :]
     both = both if outputs == 2 else both.sum(axis=2, keepdims=True)
     found = []
     for axis in range(2):
@@ -95,13 +100,14 @@ def expected_lines(machine, joint, at, outputs):
     return found
 
 
+@pytest.mark.parametrize("seen", SEEN)
 @pytest.mark.parametrize(("outputs", "softening", "skew"), KINDS)
-def test_lines_are_those_of_dense_solutions(outputs, softening, skew):
+def test_lines_are_those_of_dense_solutions(outputs, softening, skew, seen):
     at = points()
     machine, joint = machine_of(CoupledLayout(MODES, outputs == 2, softening, skew))
-    expected = expected_lines(machine, joint, at, outputs)
+    expected = expected_lines(machine, joint, at, outputs, seen)
     for gradient in (True, False):
-        for lines, truth in zip(fill(machine, joint, at, outputs, gradient), expected, strict=True):
+        for lines, truth in zip(fill(machine, joint, at, outputs, gradient, seen), expected, strict=True):
             np.testing.assert_allclose(lines.parts, truth, rtol=1e-10, atol=1e-12 * np.abs(truth).max())
 
 
@@ -157,16 +163,17 @@ def sizes(machine, joint, outputs):
     return np.concatenate([*parts, joint])
 
 
+@pytest.mark.parametrize("seen", SEEN[:2])
 @pytest.mark.parametrize(("outputs", "softening", "skew"), KINDS)
-def test_gradient_against_differences_of_dense_solutions(outputs, softening, skew):
+def test_gradient_against_differences_of_dense_solutions(outputs, softening, skew, seen):
     at = points(4)
     machine, joint = machine_of(CoupledLayout(MODES, outputs == 2, softening, skew))
-    found = fill(machine, joint, at, outputs)
+    found = fill(machine, joint, at, outputs, seen=seen)
     size = sizes(machine, joint, outputs)
     assert all(lines.gradient.shape[2] == size.size for lines in found)
 
     def lines_at(k, step):
-        return [each.sum(axis=2) for each in expected_lines(*shifted(machine, joint, k, step, outputs), at, outputs)]
+        return [each.sum(axis=2) for each in expected_lines(*shifted(machine, joint, k, step, outputs), at, outputs, seen)]
 
     for k, unit in enumerate(size):
         h = 3e-4 * unit
@@ -178,12 +185,25 @@ def test_gradient_against_differences_of_dense_solutions(outputs, softening, ske
             assert np.abs(gradient - difference).max() < 1e-7 * scale, (axis, k)
 
 
+@pytest.mark.parametrize("seen", SEEN)
 @pytest.mark.parametrize("outputs", [1, 2])
-def test_a_change_of_the_flange_moves_a_line_by_what_it_feels(outputs):
+def test_the_slope_is_the_change_with_the_distance(outputs, seen):
+    at = points(5)
+    machine, joint = machine_of(CoupledLayout(MODES, outputs == 2, skew=EVERY_PAIR))
+    found = fill(machine, joint, at, outputs, seen=seen)
+    step = np.array([[1e-3, 0.0]])
+    near, far = (expected_lines(machine, joint, at, outputs, seen + sign * step) for sign in (-1.0, 1.0))
+    for lines, a, b in zip(found, far, near, strict=True):
+        np.testing.assert_allclose(lines.turned, (a - b).sum(axis=2)[:, 0] / 2e-3, rtol=1e-7)
+
+
+@pytest.mark.parametrize("seen", SEEN)
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_a_change_of_the_flange_moves_a_line_by_what_it_feels(outputs, seen):
     """v^T dB x for any dB: a static compliance more, between any two directions; the fixture does not move with it."""
     at = points(5)
     machine, joint = machine_of(CoupledLayout(MODES, outputs == 2, skew=EVERY_PAIR))
-    found = fill(machine, joint, at, outputs)
+    found = fill(machine, joint, at, outputs, seen=seen)
     # a residual R R^T with a step along r r^T, r any direction
     static = machine.residual @ machine.residual.T
     for r in np.vstack([np.eye(4), [[1.0, -0.5, 2.0, 0.3]]]):
@@ -197,7 +217,7 @@ def test_a_change_of_the_flange_moves_a_line_by_what_it_feels(outputs):
             )
             for sign in (1.0, -1.0)
         )
-        both = (expected_lines(each, joint, at, outputs) for each in (ahead, behind))
+        both = (expected_lines(each, joint, at, outputs, seen) for each in (ahead, behind))
         for lines, a, b in zip(found, *both, strict=True):
             difference = (a - b).sum(axis=2) / (2.0 * step)
             moved = np.einsum("noi,i,j,nj->no", lines.felt, r, r, lines.moved)
@@ -215,7 +235,7 @@ def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(o
     at.flange[across] = at.flange.transpose(0, 2, 1)[across] = 0.0
     at.tip[:, :2, 1] = at.tip[:, 2:, 0] = 0.0
     planes = [unpack_axis(theta[layout.axis(i)], part) for i, part in enumerate(layout.axes)]
-    found = fill(side_by_side(*planes), joint, at, outputs)
+    found = fill(side_by_side(*planes), joint, at, outputs, seen=ELSEWHERE)
     first = 0
     for i, (plane_of, lines) in enumerate(zip(planes, found, strict=True)):
         own = np.flatnonzero(at.place[:, i] >= 0)
@@ -227,9 +247,11 @@ def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(o
         size, half = layout.axes[i].size + 4, own.size * outputs
         points_of = np.stack([at.omega[own], at.x[own], np.ones(own.size), np.zeros(own.size)], axis=1)
         shares = FLANGE_ALONE if outputs == 1 else GAP_AND_FIXTURE
-        values, kept = cross_frf(plane_of.omega_n, plane_of.shapes, plane_of.factor, plane_of.softening, joint, shares, points_of, holder)
+        seen = ELSEWHERE[i].copy()
+        machine = plane_of.omega_n, plane_of.shapes, plane_of.factor, plane_of.softening, joint
+        values, kept, _ = cross_frf(*machine, (shares, seen), points_of, holder)
         rows, weight = np.empty((size, 2 * half)), np.ones((own.size, outputs), dtype=complex)
-        machine = plane_of.omega_n, plane_of.factor, plane_of.softening, joint, shares
+        machine = plane_of.omega_n, plane_of.factor, plane_of.softening, joint, (shares, seen)
         cross_frf_gradient(*machine, points_of, kept, weight, np.ones(size), rows)
         gradient = (rows[:, :half] + 1j * rows[:, half:]).T.reshape(own.size, outputs, size)
         force = at.force[own, i, None]
@@ -298,7 +320,7 @@ def posed(seed=4, freedoms=5, modes=3, postures=2, bodies=2, count=4):
 
 
 def room_of(outputs, columns, rows=3):
-    shapes = (rows, outputs, 3), (rows, outputs, columns), (rows, outputs, 4), (rows, 4)
+    shapes = (rows, outputs, 3), (rows, outputs, columns), (rows, outputs, 4), (rows, 4), (0,)
     return LineArrays(*(np.full(shape, np.nan, dtype=complex) for shape in shapes))
 
 

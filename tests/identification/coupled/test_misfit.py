@@ -12,6 +12,7 @@ from rcsa_ident.identification.coupled.score import coupled_start
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import AxisLayout, Layout, scaled_joint
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.rough_data import with_distances
 from tests.identification.coupled.models import LAYOUTS, coupled_vector, dense_lines, named
 from tests.identification.models import vector_of
 from tests.identification.test_misfit import dense, flat
@@ -22,7 +23,9 @@ SHARES = (0.02, 0.05)
 @pytest.fixture(scope="module")
 def tables(plain, rich):
     """Points by number of outputs."""
-    return {1: coupled_data(plain), 2: coupled_data(rich)}
+    # one sensor looks behind the flange, one at the holder, and nobody knows where exactly
+    looking = with_distances(rich, np.array([0.03, -0.02]), np.array([0.02, 0.005]))
+    return {1: coupled_data(plain), 2: coupled_data(looking)}
 
 
 def case(tables, layout):
@@ -37,7 +40,7 @@ def test_the_rich_case_has_everything(tables):
     points = tables[2]
     assert points.base.clampings == 2
     assert len(points.base.coefficients) == 4  # K_tc and k_rc, two run-outs
-    assert len(points.base.coefficient_spread) == 4 + 2 * 2 * 2 * 2  # and smooth errors
+    assert len(points.base.coefficient_spread) == 4 + 2 * 2 * 2 * 2 + 2  # and smooth errors, and where the sensors look
     assert np.abs(points.relative_speed).max() == pytest.approx(1.0)
     assert (points.place < 0).any(axis=0).all()
 
@@ -53,7 +56,8 @@ def test_models_from_their_definition(tables, layout):
     rows = PointArrays(
         points.omega, points.relative_speed, points.speed, points.place, points.flange[turning], points.tip[turning], points.force
     )
-    both = dense_lines(unpack(theta, layout), scaled_joint(theta[layout.joint]), rows)
+    seen = [misfit.seen_at(i, theta, layout) for i in range(2)]
+    both = dense_lines(unpack(theta, layout), scaled_joint(theta[layout.joint]), rows, seen)
     force = points.force * np.exp(points.slope @ scales[:named_ones])
     moved = np.einsum("paof,pf->pao", both, force)
     for i, (axis, model) in enumerate(zip(data.axes, misfit.models(theta, layout), strict=True)):

@@ -9,7 +9,7 @@ import { quantityInput, u } from "../units.js";
 import { queueFor } from "../uploads.js";
 import { targetMachine } from "./target_machine.js";
 
-const SENSOR = ["Channel", "Measures", "Axis", "Sensitivity"];
+const SENSOR = [["Channel"], ["Measures"], ["Axis"], ["Sensitivity"], ["Behind the flange", "depth"]];
 
 let kept = [];
 
@@ -111,11 +111,11 @@ export async function view(_args, _query, place) {
       h(
         "p",
         { class: "small soft" },
-        "Channels by their names in the recordings. Sensitivity in V/m or V/(m/s²); 1 where the file is in SI. Leave a name empty for a channel that is not there.",
+        "Channels by their names in the recordings. Sensitivity in V/m or V/(m/s²); 1 where the file is in SI. Leave a name empty for a channel that is not there. Behind the flange: from the face between holder and spindle to the spot that a displacement sensor looks at, towards the spindle's rear; below 0 on the holder. A ruler is enough.",
       ),
       tableFrame(
         "Sensors",
-        SENSOR.map((name) => ({ name })),
+        SENSOR.map(([name, kind]) => ({ name, unit: kind && u(kind) })),
         sensors,
       ),
     ),
@@ -196,7 +196,12 @@ export async function view(_args, _query, place) {
             .filter((tr) => tr.inputs.channel.value.trim())
             .map((tr) => [
               tr.inputs.channel.value.trim(),
-              { quantity: tr.inputs.kind.value, axis: tr.inputs.axis.value, sensitivity: tr.inputs.sensitivity.base },
+              {
+                quantity: tr.inputs.kind.value,
+                axis: tr.inputs.axis.value,
+                sensitivity: tr.inputs.sensitivity.base,
+                ...(told(tr.inputs) ? { distance_behind_flange_mm: tr.inputs.distance.base } : {}),
+              },
             ]),
         ),
         workpiece: { name: material.value.trim(), tangential_coefficient_mpa: ktc.input.base, radial_ratio: krc.input.base },
@@ -230,6 +235,11 @@ export async function view(_args, _query, place) {
   );
 }
 
+/** Whether a row tells how far behind the flange its sensor looks. */
+function told(inputs) {
+  return inputs.kind.value === "displacement" && inputs.distance.base !== null;
+}
+
 function sensorRow(channel, kind, axis) {
   const inputs = {
     channel: h("input", { "aria-label": "Channel", autocomplete: "off" }),
@@ -250,8 +260,16 @@ function sensorRow(channel, kind, axis) {
       { "aria-label": "Axis" },
     ),
     sensitivity: quantityInput("none", 1, { "aria-label": "Sensitivity" }),
+    distance: quantityInput("depth", null, { "aria-label": "Behind the flange" }),
   };
   inputs.channel.value = channel;
+  const fields = new Map([
+    [inputs.sensitivity, "sensitivity"],
+    [inputs.distance, "distance_behind_flange_mm"],
+  ]);
+  const shown = () => (inputs.distance.disabled = inputs.kind.value !== "displacement");
+  inputs.kind.addEventListener("change", shown);
+  shown();
   const tr = h(
     "tr",
     { role: "row" },
@@ -259,11 +277,12 @@ function sensorRow(channel, kind, axis) {
       labelled(
         h(
           "td",
-          { role: "cell", "data-field": input === inputs.sensitivity ? `sensors.${channel}.sensitivity` : "" },
+          { role: "cell", "data-field": fields.has(input) ? `sensors.${channel}.${fields.get(input)}` : "" },
           input,
-          input === inputs.sensitivity ? h("div", { class: "fault", hidden: true }) : null,
+          fields.has(input) ? h("div", { class: "fault", hidden: true }) : null,
         ),
-        SENSOR[k],
+        SENSOR[k][0],
+        SENSOR[k][1] && u(SENSOR[k][1]),
       ),
     ),
   );

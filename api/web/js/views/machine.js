@@ -18,7 +18,7 @@ const CSV = "text/csv";
 export function statusMark(machine) {
   const known = machine.identification;
   if (!known) return mark("idle", "not identified");
-  return mark({ converged: "good", measured: "good", suspect: "doubt" }[known.status] ?? "bad", known.status);
+  return mark({ converged: "good", measured: "good", "not validated": "doubt", suspect: "doubt" }[known.status] ?? "bad", known.status);
 }
 
 export async function view({ id }, _query, place) {

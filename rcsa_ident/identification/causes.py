@@ -1,0 +1,204 @@
+"""What may stand behind lines that the model leaves unexplained, and what each would do to the answer.
+
+Each cause is a set of further unknowns with a prior, linearised at the answer: how the lines would change if the stiffness drifted with
+time, if the joint differed from clamping to clamping, if the forces were wrong in each order of the teeth. With J of the answer's
+unknowns, H its Gauss-Newton matrix, Z of the cause's (in units of their spreads) and r the residual,
+
+    S = 1 + Z^T Z - Z^T J H^-1 J^T Z,   w = -S^-1 Z^T r,   gain = r^T Z S^-1 Z^T r,   evidence = gain - log det S:
+
+twice the logarithm of how much likelier the lines are with the cause than without it [mackay1992]. The answer would move by
+-H^-1 J^T Z w, and its covariance grow by H^-1 J^T Z S^-1 Z^T J H^-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.data import LEVER
+from rcsa_ident.identification.levenberg_marquardt import Solution
+from rcsa_ident.identification.linearisation import Linearisation, Residual
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.model_order import evidence
+from rcsa_ident.identification.parameters import JOINT
+
+#: Evidence above which a cause is believed.
+BELIEVED = 15.0
+#: Spreads: of a natural frequency from the first to the last cut and over the speeds, of a cut's scale, of the force in an order of the
+#: teeth, of a clamping's joint stiffness; and of where the flange's sensor looks [m].
+_DRIFT, _SCALE, _ORDER, _CLAMPING, _DISTANCE = 0.015, 0.03, 0.05, 0.06, 20e-3
+
+
+class Cause(StrEnum):
+    """What the lines may contradict the model for."""
+
+    TIME = "time"
+    SPEED = "speed"
+    ORDER = "order"
+    SCALE = "scale"
+    CLAMPING = "clamping"
+    DISTANCE = "distance"
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """How well a cause explains what is left.
+
+    Parameters
+    ----------
+    cause : Cause
+    evidence : float [-]
+        Twice the logarithm of the odds against no cause.
+    share : float [-]
+        Of the squares of all residuals that it takes away.
+    """
+
+    cause: Cause
+    evidence: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Causes:
+    """All causes that were asked, and what they would do to the answer together.
+
+    Parameters
+    ----------
+    found : tuple of Explanation
+        The likeliest first.
+    covariance : array, shape (p, p)
+        Of the answer's unknowns if any of them may act, about where the answer is.
+    without : float [-]
+        Probability that none of them acts.
+    """
+
+    found: tuple[Explanation, ...]
+    covariance: FloatArray
+    without: float
+
+    @property
+    def believed(self) -> tuple[Explanation, ...]:
+        """Those that the lines speak for."""
+        return tuple(each for each in self.found if each.evidence > BELIEVED)
+
+    def mixed(self, covariance: FloatArray) -> FloatArray:
+        """Return the covariance of an answer that holds without any of them, and the wider one in so far as they act, shape (p, p)."""
+        found: FloatArray = self.without * covariance + (1.0 - self.without) * self.covariance
+        return 0.5 * (found + found.T)
+
+
+def causes(solution: Solution, misfit: Misfit, wider: float = 1.0) -> Causes:
+    """Return what may stand behind the residuals of an answer.
+
+    Parameters
+    ----------
+    solution : Solution
+        With its equations.
+    misfit : Misfit
+        Whose minimum it is.
+    wider : float
+        Factor on all standard deviations.
+    """
+    linear, residual = solution.evaluation.linear, solution.evaluation.residual
+    assert linear is not None
+    inverse = np.linalg.inv(linear.hessian)
+    squares = sum(residual.chi2)
+    found, columns = [], []
+    for cause, rows in _columns(solution, misfit).items():
+        gradient, information, across = _bordered(linear, residual, inverse, rows)
+        gain = float(gradient @ np.linalg.solve(information, gradient))
+        evidence = gain - float(np.linalg.slogdet(information)[1])
+        found.append(Explanation(cause, evidence, gain / max(squares, 1e-300)))
+        columns.append(rows)
+    if not found:
+        return Causes((), wider**2 * inverse, 1.0)
+    found.sort(key=lambda each: -each.evidence)
+    together = [np.hstack([rows[i] for rows in columns]) for i in range(len(misfit.data.axes))]
+    gradient, information, across = _bordered(linear, residual, inverse, together)
+    moved = across @ np.linalg.solve(information, gradient)
+    covariance = wider**2 * (inverse + across @ np.linalg.solve(information, across.T)) + np.outer(moved, moved)
+    odds = np.exp(0.5 * np.clip([0.0, *(each.evidence for each in found)], -100.0, 100.0))
+    return Causes(tuple(found), covariance, float(odds[0] / odds.sum()))
+
+
+def with_orders(solution: Solution, misfit: Misfit) -> float:
+    """Return minus twice the log evidence of an answer [-], with factors on the forces of the teeth's orders where that is likelier."""
+    gains = [each.evidence for each in causes(solution, misfit).found if each.cause is Cause.ORDER]
+    return evidence(solution, misfit) - max([0.0, *gains])
+
+
+def _bordered(
+    linear: Linearisation, residual: Residual, inverse: FloatArray, rows: Sequence[FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gradient and information of further unknowns of unit spread, those of the answer eliminated, and H^-1 J^T Z."""
+    count = rows[0].shape[1]
+    gradient, own, mixed = linear.border(dict(enumerate(rows)), count, residual)
+    across = inverse @ mixed
+    # along a ridge the polish ends early: what the answer's own unknowns would still gain is no cause's
+    gradient = gradient - across.T @ linear.gradient
+    return gradient, own[0] + np.eye(count) - mixed.T @ across, across
+
+
+def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[FloatArray]]:
+    """Change of the whitened lines of each axis with the unknowns of each cause, shape (2 n, q) [standard deviations]."""
+    data, layout, linear = misfit.data, solution.layout, solution.evaluation.linear
+    assert linear is not None
+    axes, toolings = range(len(data.axes)), range(len(data.toolings))
+    cut = [np.tile(own, 2) for own in linear.cut]
+    tooling = [data.cut_tooling[own] for own in cut]
+    order = [np.tile(np.repeat(np.rint(axis.order).astype(np.intp), axis.outputs), 2) for axis in data.axes]
+    model = [_model(solution, misfit, i) for i in axes]
+    # behind an axis' own unknowns stand the joint's, then the coefficients
+    behind = [layout.axis(i).stop - layout.axis(i).start for i in axes]
+    stiffness = [linear.jacobians[i][behind[i] : behind[i] + JOINT // 2].T for i in axes]
+    frequencies = [linear.jacobians[i][: layout.modes_of_axes[min(i, len(layout.modes_of_axes) - 1)]].T for i in axes]
+    # planes that feel nothing of each other have modes of their own
+    apart = len(layout.modes_of_axes) > 1
+
+    def drift(course: FloatArray) -> list[FloatArray]:
+        moved = [_DRIFT * course[cut[i]][:, None] * frequencies[i] for i in axes]
+        return _side_by_side(moved) if apart else moved
+
+    def by_key(keys: Sequence[Sequence[tuple[int, ...]]], values: Sequence[tuple[FloatArray, ...]]) -> list[FloatArray]:
+        """One unknown, or a complex one, for each key of the lines."""
+        known = {key: k for k, key in enumerate(sorted({key for own in keys for key in own}))}
+        found = []
+        for own, parts in zip(keys, values, strict=True):
+            columns = np.zeros((len(own), len(parts), len(known)))
+            at = np.array([known[key] for key in own])
+            for k, part in enumerate(parts):
+                columns[np.arange(at.size), k, at] = part
+            found.append(columns.reshape(len(own), -1))
+        return found
+
+    orders = [[(i, t, m) for t, m in zip(tooling[i].tolist(), order[i].tolist(), strict=True)] for i in axes]
+    cuts = [[(k,) for k in own.tolist()] for own in cut]
+    found = {
+        Cause.TIME: drift(np.linspace(-1.0, 1.0, len(data.cut_ids))),
+        Cause.SPEED: drift(misfit.relative_speed),
+        Cause.ORDER: by_key(orders, [(_ORDER * real, _ORDER * turned) for real, turned in model]),
+        Cause.SCALE: by_key(cuts, [(_SCALE * real,) for real, _ in model]),
+        Cause.CLAMPING: [np.hstack([_CLAMPING * stiffness[i] * (tooling[i] == t)[:, None] for t in toolings]) for i in axes],
+    }
+    places = [misfit.distance_place(i, layout) for i in axes]
+    if None not in places:
+        steps = [_DISTANCE / LEVER * linear.jacobians[i][[behind[i] + JOINT + (places[i] or 0)]].T for i in axes]
+        found[Cause.DISTANCE] = _side_by_side(steps)
+    return {cause: rows for cause, rows in found.items() if any(np.any(each) for each in rows)}
+
+
+def _side_by_side(own: Sequence[FloatArray]) -> list[FloatArray]:
+    """Columns of each axis, zeros where they belong to another one."""
+    return [
+        np.hstack([each if i == k else np.zeros((own[i].shape[0], each.shape[1])) for k, each in enumerate(own)]) for i in range(len(own))
+    ]
+
+
+def _model(solution: Solution, misfit: Misfit, i: int) -> tuple[FloatArray, FloatArray]:
+    """The model's lines of an axis and a quarter turn of them, whitened, shape (2 n,) each."""
+    lines = solution.evaluation.models[i].ravel() * misfit.root_weight(i)
+    return np.concatenate([lines.real, lines.imag]), np.concatenate([-lines.imag, lines.real])
