@@ -1,0 +1,40 @@
+"""Toolings that are left out are predicted as well as promised, and not where one of them was told wrongly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.validation import Prediction, predictions, validated, widening
+from tests.identification.test_causes import asked, made, steady
+
+
+def test_the_models_own_lines_are_predicted_as_promised(few):
+    found, misfit, _ = asked(made(few, steady))
+    told = predictions(found, misfit)
+    assert {(each.tooling, each.axis) for each in told} == {(name, axis) for name in few.toolings for axis in (Dof.X, Dof.Y)}
+    assert all(each.holds for each in told)
+    assert validated(told)
+    assert widening(told) == 1.0
+    # noise alone is the least that can be promised
+    assert all(each.promised > 1.5e-3 for each in told)
+
+
+def test_one_tooling_is_compared_with_nothing(few):
+    alone = few.of_cuts(np.flatnonzero(few.cut_tooling == 0))
+    found, misfit, _ = asked(made(alone, steady))
+    assert predictions(found, misfit) == ()
+    assert not validated(())
+
+
+@pytest.mark.parametrize(("error", "factor"), [(0.019, 1.0), (0.05, 5.0)])
+def test_bands_are_widened_to_what_was_seen(error, factor):
+    seen = (Prediction("A", Dof.X, error, 0.01), Prediction("B", Dof.X, 0.005, 0.01))
+    assert widening(seen) == pytest.approx(factor)
+
+
+def test_every_axis_needs_a_promise_that_says_something():
+    seen = Prediction("A", Dof.X, 0.01, 0.01)
+    assert validated((seen,))
+    assert not validated((seen, replace(seen, axis=Dof.Y, promised=2.0)))
