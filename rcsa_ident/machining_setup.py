@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -281,6 +282,12 @@ class Cut(Shown):
         tooth is kept in either case.
     posture : tuple of float [rad]
         Of a robot's joints; empty on any other machine.
+    started : datetime or None
+        When its recording began.
+    temperature : float or None [°C]
+        Near the spindle's bearings.
+    validation : bool
+        It is predicted, and nothing is learned from it.
     """
 
     id: str
@@ -290,6 +297,9 @@ class Cut(Shown):
     air: Path | None = None
     last_speed: float | None = None
     posture: tuple[float, ...] = ()
+    started: datetime | None = None
+    temperature: float | None = None
+    validation: bool = False
 
     @property
     def speeds(self) -> tuple[float, float]:

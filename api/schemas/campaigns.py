@@ -144,6 +144,9 @@ class CutConditions(BaseModel):
     tilt_deg: float | None = None
     feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
     posture_deg: list[float] | None = Field(None, description="Of a robot's joints; an identification here takes cuts at one posture.")
+    started: str | None = Field(None, description="When the recording began, as 2026-11-27T08:15:00.")
+    temperature_c: float | None = Field(None, description="Near the spindle's bearings.")
+    validation: bool | None = Field(None, description="The cut is predicted, and nothing is learned from it.")
 
 
 class CutKeys(Body, CutConditions):

@@ -28,7 +28,7 @@ from rcsa_ident.identification.parameters import Layout, parameter_names, planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, MetTest, Standstill
 from rcsa_ident.identification.status import Status
-from rcsa_ident.identification.validation import Prediction, predictions, validated, widening
+from rcsa_ident.identification.validation import Prediction, judged, predictions, validated, widening
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
 from rcsa_ident.tool_holder.drawings import KnownToolings
@@ -70,6 +70,8 @@ class Fit(ABC):
     solution: Solution
     misfit: Misfit
     rival: Solution
+    #: With the cuts that judge the answer.
+    whole: IdentificationData | None
     #: Factor on the standard deviations.
     wider: ClassVar[float] = WIDER
 
@@ -99,7 +101,7 @@ class Fit(ABC):
         own = self._rough_entries(self.solution)
         # wider bands do not make less known than was known before
         covariance = self.covariance[np.ix_(own, own)]
-        return KnownToolings(rough.unknowns, rough.spread, self.rough_values, covariance, self.data.toolings)
+        return KnownToolings(rough.unknowns, rough.spread, self.rough_values, covariance, self.data.used_toolings)
 
     @cached_property
     def evidence(self) -> float:
@@ -114,7 +116,10 @@ class Fit(ABC):
     @cached_property
     def predictions(self) -> tuple[Prediction, ...]:
         """How the lines of each tooling are predicted by the other ones."""
-        return predictions(self.solution, self.misfit, self.wider)
+        return (
+            *predictions(self.solution, self.misfit, self.wider),
+            *(() if self.whole is None else judged(self.solution, self.misfit, self.whole, self.wider)),
+        )
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -141,7 +146,7 @@ class Fit(ABC):
         assert evaluation.linear is not None
         reasons, notes = self.doubts()
         reasons = [*because(self.causes), *reasons, *not_as_predicted(self.predictions)]
-        if not data.distance_told and len(data.toolings) < ENOUGH_FOR_DISTANCE:
+        if not data.distance_told and len(self._compared) < ENOUGH_FOR_DISTANCE:
             notes = [Remark(IdentificationCode.DISTANCE_UNTOLD, DISTANCE_UNTOLD), *notes]
         if 2 * data.swept_cuts > data.cuts:
             reasons = [*reasons, Remark(IdentificationCode.MOSTLY_PASSES, MOSTLY_PASSES)]
@@ -169,7 +174,12 @@ class Fit(ABC):
     @property
     def _validated(self) -> bool:
         """Whether the toolings predict each other, and could not do so with sensors that look elsewhere: two always find modes for that."""
-        return validated(self.predictions) and (self.data.distance_told or len(self.data.toolings) >= ENOUGH_FOR_DISTANCE)
+        return validated(self.predictions) and (self.data.distance_told or len(self._compared) >= ENOUGH_FOR_DISTANCE)
+
+    @property
+    def _compared(self) -> tuple[str, ...]:
+        """Toolings that learn or judge."""
+        return (self.data if self.whole is None else self.whole).used_toolings
 
     def _gain(self, k: int) -> tuple[float, float]:
         """Value and standard deviation of the gain of a hammer test, as a logarithm."""
@@ -246,6 +256,7 @@ class PlaneFit(Fit):
     solution : Solution
     misfit : Misfit
     rival : Solution
+    whole : IdentificationData, optional
     """
 
     data: IdentificationData
@@ -253,6 +264,7 @@ class PlaneFit(Fit):
     solution: Solution
     misfit: Misfit
     rival: Solution
+    whole: IdentificationData | None = None
 
     def machines(self) -> dict[str, Any]:
         """Return each axis with its posterior."""
@@ -320,6 +332,7 @@ class CoupledFit(Fit):
     solution : Solution
     misfit : Misfit
     rival : Solution
+    whole : IdentificationData, optional
     """
 
     data: IdentificationData
@@ -329,6 +342,7 @@ class CoupledFit(Fit):
     solution: Solution
     misfit: Misfit
     rival: Solution
+    whole: IdentificationData | None = None
 
     def machines(self) -> dict[str, Any]:
         """Return both planes as one machine, and each at standstill without the other."""

@@ -19,28 +19,33 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.identification.data import LEVER
+from rcsa_ident.identification.data import LEVER, IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.linearisation import Linearisation, Residual
+from rcsa_ident.identification.made_cuts import USUAL_PAUSE
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import evidence
 from rcsa_ident.identification.parameters import JOINT
 
 #: Evidence above which a cause is believed.
 BELIEVED = 15.0
+#: Time constants of the warmth that is asked for [s], and the exponent of the speed in the heat of friction.
+_CONSTANTS, _FRICTION = (450.0, 900.0, 1800.0), 1.25
 #: Spreads: of a natural frequency from the first to the last cut and over the speeds, of a cut's scale, of the force in an order of the
-#: teeth, of a clamping's joint stiffness; and of where the flange's sensor looks [m].
-_DRIFT, _SCALE, _ORDER, _CLAMPING, _DISTANCE = 0.015, 0.03, 0.05, 0.06, 20e-3
+#: teeth, of a clamping's joint stiffness, of that between quiet and loud cuts; and of where the flange's sensor looks [m].
+_DRIFT, _SCALE, _ORDER, _CLAMPING, _AMPLITUDE, _DISTANCE = 0.015, 0.03, 0.05, 0.06, 0.025, 20e-3
 
 
 class Cause(StrEnum):
     """What the lines may contradict the model for."""
 
     TIME = "time"
+    TEMPERATURE = "temperature"
     SPEED = "speed"
     ORDER = "order"
     SCALE = "scale"
     CLAMPING = "clamping"
+    AMPLITUDE = "amplitude"
     DISTANCE = "distance"
 
 
@@ -108,19 +113,24 @@ def causes(solution: Solution, misfit: Misfit, wider: float = 1.0) -> Causes:
     inverse = np.linalg.inv(linear.hessian)
     squares = sum(residual.chi2)
     found, columns = [], []
-    for cause, rows in _columns(solution, misfit).items():
-        gradient, information, across = _bordered(linear, residual, inverse, rows)
-        gain = float(gradient @ np.linalg.solve(information, gradient))
-        evidence = gain - float(np.linalg.slogdet(information)[1])
-        found.append(Explanation(cause, evidence, gain / max(squares, 1e-300)))
-        columns.append(rows)
+    for cause, ways in _columns(solution, misfit).items():
+        asked = []
+        for rows in ways:
+            gradient, information, _ = _bordered(linear, residual, inverse, rows)
+            gain = float(gradient @ np.linalg.solve(information, gradient))
+            asked.append((gain - float(np.linalg.slogdet(information)[1]), gain))
+        best = max(range(len(ways)), key=lambda k: asked[k][0])
+        # the likeliest of several ways, any of which might have been it
+        likelihood = asked[best][0] - 2.0 * float(np.log(len(ways)))
+        found.append(Explanation(cause, likelihood, asked[best][1] / max(squares, 1e-300)))
+        columns.append(ways[best])
     if not found:
         return Causes((), wider**2 * inverse, 1.0)
     found.sort(key=lambda each: -each.evidence)
     together = [np.hstack([rows[i] for rows in columns]) for i in range(len(misfit.data.axes))]
     gradient, information, across = _bordered(linear, residual, inverse, together)
     moved = across @ np.linalg.solve(information, gradient)
-    covariance = wider**2 * (inverse + across @ np.linalg.solve(information, across.T)) + np.outer(moved, moved)
+    covariance = wider**2 * (inverse + across @ np.linalg.solve(information, across.T) + np.outer(moved, moved))
     odds = np.exp(0.5 * np.clip([0.0, *(each.evidence for each in found)], -100.0, 100.0))
     return Causes(tuple(found), covariance, float(odds[0] / odds.sum()))
 
@@ -143,8 +153,8 @@ def _bordered(
     return gradient, own[0] + np.eye(count) - mixed.T @ across, across
 
 
-def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[FloatArray]]:
-    """Change of the whitened lines of each axis with the unknowns of each cause, shape (2 n, q) [standard deviations]."""
+def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatArray]]]:
+    """Change of the whitened lines of each axis with the unknowns of each way in which a cause may act, shape (2 n, q) [deviations]."""
     data, layout, linear = misfit.data, solution.layout, solution.evaluation.linear
     assert linear is not None
     axes, toolings = range(len(data.axes)), range(len(data.toolings))
@@ -178,17 +188,65 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[FloatArray]
     orders = [[(i, t, m) for t, m in zip(tooling[i].tolist(), order[i].tolist(), strict=True)] for i in axes]
     cuts = [[(k,) for k in own.tolist()] for own in cut]
     found = {
-        Cause.TIME: drift(np.linspace(-1.0, 1.0, len(data.cut_ids))),
-        Cause.SPEED: drift(misfit.relative_speed),
-        Cause.ORDER: by_key(orders, [(_ORDER * real, _ORDER * turned) for real, turned in model]),
-        Cause.SCALE: by_key(cuts, [(_SCALE * real,) for real, _ in model]),
-        Cause.CLAMPING: [np.hstack([_CLAMPING * stiffness[i] * (tooling[i] == t)[:, None] for t in toolings]) for i in axes],
+        Cause.TIME: [drift(course) for course in _courses(data)],
+        Cause.SPEED: [drift(misfit.relative_speed)],
+        Cause.ORDER: [by_key(orders, [(_ORDER * real, _ORDER * turned) for real, turned in model])],
+        Cause.SCALE: [by_key(cuts, [(_SCALE * real,) for real, _ in model])],
+        Cause.CLAMPING: [[np.hstack([_CLAMPING * stiffness[i] * (tooling[i] == t)[:, None] for t in toolings]) for i in axes]],
     }
+    loud = _loudness(solution, misfit)
+    found[Cause.AMPLITUDE] = [[_AMPLITUDE * (stiffness[i].sum(axis=1) * loud[cut[i]])[:, None] for i in axes]]
+    if not np.any(np.isnan(data.made.temperature)):
+        found[Cause.TEMPERATURE] = [drift(_spread_out(data, data.made.temperature))]
     places = [misfit.distance_place(i, layout) for i in axes]
     if None not in places:
         steps = [_DISTANCE / LEVER * linear.jacobians[i][[behind[i] + JOINT + (places[i] or 0)]].T for i in axes]
-        found[Cause.DISTANCE] = _side_by_side(steps)
-    return {cause: rows for cause, rows in found.items() if any(np.any(each) for each in rows)}
+        found[Cause.DISTANCE] = [_side_by_side(steps)]
+    asked = {cause: [rows for rows in ways if any(np.any(each) for each in rows)] for cause, ways in found.items()}
+    return {cause: ways for cause, ways in asked.items() if ways}
+
+
+def _loudness(solution: Solution, misfit: Misfit) -> FloatArray:
+    """How far the flange moves in each cut, as a logarithm in standard deviations about its mean, shape (k,).
+
+    The sensors' noise is much the same in all cuts: lines of a larger force have less of it.
+    """
+    squares = np.zeros(len(misfit.data.cut_ids))
+    for axis, model in zip(misfit.data.axes, solution.evaluation.models, strict=True):
+        np.add.at(squares, axis.cut, np.sum(np.abs(model) ** 2 / np.maximum(axis.variance, 1e-300), axis=1))
+    found = np.log(np.maximum(squares, 1e-300))
+    found -= found.mean()
+    return found / max(float(found.std()), 1e-300)
+
+
+def _courses(data: IdentificationData) -> list[FloatArray]:
+    """Ways in which the machine may change with time: evenly, and as heat of friction that bearings and housing take up, shape (k,) each.
+
+    One time constant stands for them: T' = (n^p - T) / tau, from the cold machine on.
+    """
+    order = np.argsort(data.made.started, kind="stable")
+    started, speed = data.made.started[order], data.spindle_speed[: data.cuts][order]
+    heat = (speed / max(float(speed.max(initial=0.0)), 1e-300)) ** _FRICTION
+    found = [_spread_out(data, data.made.started)]
+    for constant in _CONSTANTS:
+        warmth, now = np.zeros(heat.size), 0.0
+        for k, pause in enumerate(np.diff(started, append=started[-1:] + USUAL_PAUSE)):
+            # half of the cut lies behind its recording's middle
+            kept = np.exp(-0.5 * pause / constant)
+            warmth[k] = now * kept + heat[k] * (1.0 - kept)
+            now = warmth[k] * kept + heat[k] * (1.0 - kept)
+        course = np.empty(heat.size)
+        course[order] = warmth
+        found.append(_spread_out(data, course))
+    return found
+
+
+def _spread_out(data: IdentificationData, course: FloatArray) -> FloatArray:
+    """The course over all cuts, tests behind them at its end, from -1 to 1."""
+    low, high = float(course.min(initial=np.inf)), float(course.max(initial=-np.inf))
+    if not high > low:
+        return np.zeros(len(data.cut_ids))
+    return np.pad(2.0 * (course - low) / (high - low) - 1.0, (0, len(data.tests)))
 
 
 def _side_by_side(own: Sequence[FloatArray]) -> list[FloatArray]:

@@ -12,6 +12,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
+from rcsa_ident.identification.made_cuts import MadeCuts, in_order
 from rcsa_ident.identification.rough_toolings import RoughLines, placed
 from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING
 from rcsa_ident.signals.motion import FLANGE_ALONE, ONE_PLACE, searched, usual_shares
@@ -22,6 +23,8 @@ from rcsa_ident.tool_holder.rough import RoughToolHolder
 LEVER = 0.1
 #: Where within the half of a frequency range a line sweeps its tool-holder is asked beside the middle: Gauss's node.
 NODE = float(np.sqrt(0.6))
+#: Share of the lines by which force model, tool-holder or sensors may be wrong alike at neighbouring frequencies.
+SMOOTH_ERROR = 2e-3
 #: Half the range of the spindle speeds, over their middle, below which nothing is asked about a change with speed.
 LEAST_SPEED_RANGE = 0.05
 
@@ -283,6 +286,8 @@ class IdentificationData:
         Where what is not known of an axis' `behind` stands among them.
     distance_told : bool
         Whether somebody has told where the flange's sensors look.
+    made : MadeCuts
+        When the cuts, without the tests, were made, and which of them judge the answer.
     rough : RoughToolings or None
         What drawings do not tell; unknowns in units of their spreads, behind the gains and in front of the smooth errors.
     rough_holders : tuple of RoughToolHolder
@@ -309,10 +314,26 @@ class IdentificationData:
     talk_place: Mapping[Dof, int] = field(default_factory=dict)
     distance_place: Mapping[Dof, int] = field(default_factory=dict)
     distance_told: bool = True
+    made: MadeCuts = field(default=None)  # type: ignore[assignment]
     rough: RoughToolings | None = None
     rough_holders: tuple[RoughToolHolder, ...] = ()
     rough_first: int = 0
     rough_start: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if self.made is None:
+            object.__setattr__(self, "made", in_order(self.cuts))
+
+    def learned_from(self) -> IdentificationData:
+        """Return the same data without the cuts that judge the answer."""
+        keep = np.ones(len(self.cut_ids), dtype=bool)
+        keep[: self.cuts] = ~self.made.judged
+        return self if np.all(keep) else self.of_cuts(np.flatnonzero(keep))
+
+    @property
+    def used_toolings(self) -> tuple[str, ...]:
+        """Toolings of which there are lines."""
+        return tuple(self.toolings[t] for t in np.unique(self.cut_tooling))
 
     @property
     def rough_place(self) -> slice:
@@ -383,8 +404,8 @@ class IdentificationData:
     @property
     def side_minima(self) -> bool:
         """Whether further starts pay: no sensor sees the flange, of fewer than three toolings, each of which has cut often enough."""
-        cuts = np.bincount(self.cut_tooling[: self.cuts], minlength=len(self.toolings))
-        return not self.of_flange and len(self.toolings) < FEWEST_OF_HOUSING and bool(np.all(cuts >= FEWEST_CUTS))
+        _, cuts = np.unique(self.cut_tooling[: self.cuts], return_counts=True)
+        return not self.of_flange and cuts.size < FEWEST_OF_HOUSING and bool(np.all(cuts >= FEWEST_CUTS))
 
     @property
     def sweeps(self) -> bool:
@@ -411,6 +432,8 @@ class IdentificationData:
     def speed_range(self) -> tuple[float, float]:
         """Middle of the spindle speeds and half their range [rad/s]; the latter 0 where nothing can change with speed."""
         speed = self.spindle_speed[: self.cuts]
+        # the answer's own speeds, whatever judges it
+        speed = speed[~self.made.judged] if not np.all(self.made.judged) else speed
         if speed.size == 0:
             return 0.0, 0.0
         low, high = float(np.min(speed)), float(np.max(speed))
@@ -476,6 +499,7 @@ class IdentificationData:
             cut_prior=CutPrior(*self.cut_prior.columns[keep].T),
             clamping=self.clamping[keep],
             edge=self.edge[keep],
+            made=self.made.of(keep[keep < self.cuts]),
         )
 
     def only(self, axis: Dof) -> IdentificationData:

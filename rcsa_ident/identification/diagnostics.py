@@ -133,20 +133,21 @@ def diagnose(
                 f"{str(axis.axis).upper()}: the machine's contribution to the tooltip FRF has a standard deviation of {100 * band:.1f} % "
                 f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed",
             )
-    if len(data.toolings) < FEWEST_TOOLINGS:
+    toolings = data.used_toolings
+    if len(toolings) < FEWEST_TOOLINGS:
         how = "cut with" if data.cuts else "hit"
         words = f"only one tooling: translation and slope of the flange cannot be separated; {how} a second, different holder"
         doubt(IdentificationCode.ONE_TOOLING, words)
-    if FEWEST_TOOLINGS <= len(data.toolings) < FEWEST_OF_HOUSING and not data.of_flange:
+    if FEWEST_TOOLINGS <= len(toolings) < FEWEST_OF_HOUSING and not data.of_flange:
         words = (
-            f"only {len(data.toolings)} toolings: too little changes on the housing from one to the next to tell what the flange does; cut "
+            f"only {len(toolings)} toolings: too little changes on the housing from one to the next to tell what the flange does; cut "
             "with a third, different one"
         )
         doubt(IdentificationCode.FEW_TOOLINGS, words)
     for t, name in enumerate(data.toolings):
         count = int(np.sum(data.cut_tooling[: data.cuts] == t))
         # a hammer hits all frequencies at once
-        if count < FEWEST_CUTS and name not in {test.tooling for test in data.tests}:
+        if name in toolings and count < FEWEST_CUTS and name not in {test.tooling for test in data.tests}:
             doubt(IdentificationCode.FEW_CUTS, f"too few cuts: {count} with {name}, at least {FEWEST_CUTS} are needed")
     return reasons
 
@@ -157,6 +158,11 @@ _CAUSES = {
         IdentificationCode.DRIFTS_WITH_TIME,
         "the machine changes from cut to cut, as bearings do that warm up",
         "let the spindle turn for half an hour before each tooling, and repeat the first speed at the end",
+    ),
+    Cause.TEMPERATURE: (
+        IdentificationCode.DRIFTS_WITH_TEMPERATURE,
+        "the machine changes with its temperature",
+        "let the spindle turn for half an hour before each tooling, until the temperature stays",
     ),
     Cause.SPEED: (
         IdentificationCode.CHANGES_WITH_SPEED,
@@ -177,6 +183,11 @@ _CAUSES = {
         IdentificationCode.CLAMPED_ANEW,
         "the joint between holder and spindle is not the same with every tooling",
         "clean the faces, clamp one tooling anew and cut with it once more",
+    ),
+    Cause.AMPLITUDE: (
+        IdentificationCode.JOINT_GIVES_WAY,
+        "the joint between holder and spindle gives way more the larger the vibration is",
+        "check the clamping force and the faces, or cut less deep",
     ),
     Cause.DISTANCE: (
         IdentificationCode.SENSOR_DISTANCE,

@@ -17,7 +17,7 @@ from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupl
 from rcsa_ident.identification.coupled.fit import coupled_starts, fit_coupled
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.score import STRIKES, Coupling, coupling
-from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
 from rcsa_ident.identification.joint_fit import (
     AxisSearch,
@@ -50,8 +50,6 @@ from rcsa_ident.identification.swept import unswept
 from rcsa_ident.identification.task import Phase, finite, perform
 from rcsa_ident.scaleout import Map
 
-#: Share of the lines by which force model, tool-holder or sensors may be wrong alike at neighbouring frequencies.
-SMOOTH_ERROR = 2e-3
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
 #: Further searches among lines that were freed of their sweeps, until two have come to evidences as near as this.
@@ -111,6 +109,7 @@ class EvidenceSelection:
         told = data.softening_spread
         if told is not None and told != self.priors.softening:
             return replace(self, priors=replace(self.priors, softening=told)).run(data, seed, map, progress)
+        whole, data = data, data.learned_from()
         try:
             sequence, trace, freed = np.random.SeedSequence(seed), list[Step](), data
             found = self._found(data, data, sequence, map, trace, progress)
@@ -126,7 +125,8 @@ class EvidenceSelection:
                 found = self._agreed(data, found, sequence, map, trace, progress)
             if data.sweeps:
                 found = self._asked(data, found, map, _report_to(BOTH, trace, progress))
-            return replace(found.answer(seed, self.name), trace=tuple(trace))
+            assert isinstance(found, PlaneFit | CoupledFit)
+            return replace(replace(found, whole=whole).answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
 

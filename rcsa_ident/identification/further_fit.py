@@ -11,8 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.answer import WIDER
-from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.evidence import SMOOTH_ERROR
+from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.known_machine import FurtherMisfit, Gaussian, KnownMachine
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.model_order import OUTLYING, cut_weights, evidence, model_error

@@ -167,6 +167,7 @@ class PaperGeneticAlgorithm:
             raise InputError("method", f"{self.name}, with passes whose speed changes", "the default method, which knows of them")
         if not_finite(data):
             return failed(data, seed, self.name)
+        data = data.learned_from()
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))
         seeds = [int(s.generate_state(1)[0]) for s in sequences]
         tasks = [GeneticSearch(self, data.only(a.axis), own, progress) for a, own in zip(data.axes, seeds, strict=True)]
@@ -194,7 +195,7 @@ class PaperGeneticAlgorithm:
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
         return Identification(
-            status=Status.SUSPECT if reasons else Status.CONVERGED,
+            status=Status.SUSPECT if reasons else Status.NOT_VALIDATED,
             reasons=tuple(reasons),
             seed=seed,
             method=self.name,
@@ -222,7 +223,8 @@ class _Problem:
         self.measured = np.abs(axis.measured) ** 2
         self.flange = np.ascontiguousarray(np.concatenate([[c.real, c.imag] for c in axis.flange.T]))
         self.tip = np.ascontiguousarray(np.concatenate([[c.real, c.imag] for c in axis.tip.T]))
-        self.points = np.bincount(data.cut_tooling[axis.cut], minlength=len(data.toolings)).astype(float)
+        _, self.tooling = np.unique(data.cut_tooling, return_inverse=True)
+        self.points = np.bincount(self.tooling[axis.cut]).astype(float)
         self.model = np.empty((2, axis.omega.size))
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -249,10 +251,10 @@ class _Problem:
         omega_n, zeta, phi_t, phi_r, joint = self.decode(x)
         fractions = modal_fractions(omega_n, zeta, phi_t, LEVER * phi_r)
         joint = joint / np.array([1.0, LEVER**2, 1.0, LEVER**2])
-        misfit = np.zeros((x.shape[0], len(self.data.toolings)))
+        misfit = np.zeros((x.shape[0], self.points.size))
         for k in range(x.shape[0]):
             modal_cross_frf(fractions[k], joint[k], self.axis.omega, self.flange, self.tip, self.model)
-            best_grid_misfit(self.model, self.measured, self.weight, self.table, self.start, self.data.cut_tooling, misfit[k])
+            best_grid_misfit(self.model, self.measured, self.weight, self.table, self.start, self.tooling, misfit[k])
         m = self.method.modes
         return self.method.cost.value(misfit, self.points, x[:, 2 * m : 3 * m], self.method.space)
 

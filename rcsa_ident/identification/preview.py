@@ -11,8 +11,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.data import coupled_data
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.parameters import CoupledLayout
-from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.evidence import SMOOTH_ERROR
+from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Step

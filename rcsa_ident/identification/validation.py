@@ -2,27 +2,31 @@
 
 Each tooling in turn is left out: from the whole answer the others are polished without it, and its lines are predicted. What belongs to
 the cutter's clamping alone, its run-out and its tooth angle, is taken from the whole answer, and each cut's delay is its own; all else,
-what its drawing does not tell included, is what the other toolings say.
+what its drawing does not tell included, is what the other toolings say. Cuts that were made to judge the answer took no part from the
+first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.linearisation import Linearisation
 from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.parameters import Layout
+from rcsa_ident.identification.swept import unswept
 
 #: Weight of cuts that take no part: their delays are still fitted.
 _NO_PART = 1e-10
-#: Steps of the polish without a tooling.
-_STEPS = 60
+#: Steps of the polish without a tooling, and delays that are tried over a tooth's pitch.
+_STEPS, _GRID = 60, 32
 #: Errors up to so many times what was promised are as promised: 95 % of them.
 WITHIN = 2.0
 #: A promise beyond this says nothing.
@@ -71,9 +75,47 @@ def predictions(solution: Solution, misfit: Misfit, wider: float = 1.0) -> tuple
     toolings = [t for t in range(len(data.toolings)) if np.any(cuts == t)]
     if len(toolings) < 2 or data.tests:
         return ()
+    return _finite(
+        each for t in toolings for each in _predicted(solution, misfit, data.cut_tooling == t, _of_the_clamping(solution, misfit, t), wider)
+    )
+
+
+def judged(solution: Solution, misfit: Misfit, whole: IdentificationData, wider: float = 1.0) -> tuple[Prediction, ...]:
+    """Return how the cuts that were made to judge an answer are predicted, for each of their toolings.
+
+    Parameters
+    ----------
+    solution : Solution
+        The whole answer.
+    misfit : Misfit
+        Whose minimum it is.
+    whole : IdentificationData
+        The same cuts, and those that took no part.
+    wider : float
+        Factor on all standard deviations.
+    """
+    aside = whole.made.judged
+    if not np.any(aside) or whole.tests:
+        return ()
+    if whole.sweeps:
+        if not isinstance(solution.layout, Layout):
+            return ()
+        whole = unswept(whole, misfit.priors, solution.theta, solution.layout)
+    # nobody has learned the tooth angle at their triggers: each delay is asked for
+    smooth = replace(whole, clamping=np.where(aside, -1, whole.clamping)).with_smooth_errors(SMOOTH_ERROR)
+    weight, nuisance = np.ones(aside.size), np.zeros((aside.size, 2))
+    weight[~aside], nuisance[~aside] = misfit.cut_weight, solution.evaluation.nuisance
+    together = misfit.with_data(smooth, weight)
+    here = replace(solution, evaluation=together.evaluate(solution.theta, solution.layout, nuisance, grid=_GRID))
+    toolings = np.unique(whole.cut_tooling[aside])
+    nothing = np.zeros(0, dtype=np.intp)
+    return _finite(each for t in toolings for each in _predicted(here, together, aside & (whole.cut_tooling == t), nothing, wider))
+
+
+def _finite(found: Iterable[Prediction]) -> tuple[Prediction, ...]:
     # of odd data a polish may run anywhere
     with np.errstate(all="ignore"):
-        return tuple(each for t in toolings for each in _predicted(solution, misfit, t, wider) if np.isfinite(each.error + each.promised))
+        return tuple(each for each in found if np.isfinite(each.error + each.promised))
 
 
 def validated(found: Sequence[Prediction]) -> bool:
@@ -87,13 +129,12 @@ def widening(found: Sequence[Prediction]) -> float:
     return max((each.error / each.promised for each in found if not each.holds), default=1.0)
 
 
-def _predicted(solution: Solution, misfit: Misfit, tooling: int, wider: float) -> list[Prediction]:
-    """The lines of one tooling, axis by axis."""
+def _predicted(solution: Solution, misfit: Misfit, own: np.ndarray, kept: np.ndarray, wider: float) -> list[Prediction]:
+    """The lines of some cuts of one tooling, axis by axis, by the other ones and by what is kept of the answer."""
     data, layout = misfit.data, solution.layout
-    own = data.cut_tooling == tooling
-    without = misfit.with_cut_weight(np.where(own, _NO_PART, misfit.cut_weight))
+    aside = own | np.pad(data.made.judged, (0, own.size - data.cuts))
+    without = misfit.with_cut_weight(np.where(aside, _NO_PART, misfit.cut_weight))
     found = refine(without, solution.theta, layout, solution.evaluation.nuisance, _STEPS)
-    kept = _of_the_clamping(solution, misfit, tooling)
     theta = found.theta.copy()
     theta[kept] = solution.theta[kept]
     there = misfit.evaluate(theta, layout, solution.evaluation.nuisance, normal=True)
@@ -111,7 +152,7 @@ def _predicted(solution: Solution, misfit: Misfit, tooling: int, wider: float) -
         promised = np.sum(doubt[i].reshape(2, -1) / root**2, axis=0)[lines] + 2.0 * axis.variance.ravel()[lines]
         size = float(np.sum(np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]).ravel()[lines] ** 2))
         error, promise = (float(np.sqrt(np.sum(each) / max(size, 1e-300))) for each in (off, promised))
-        rows.append(Prediction(data.toolings[tooling], axis.axis, error, promise))
+        rows.append(Prediction(data.toolings[data.cut_tooling[own][0]], axis.axis, error, promise))
     return rows
 
 

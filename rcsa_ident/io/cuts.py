@@ -35,6 +35,9 @@ CUT_KEYS = (
     "cut",
     "air",
     "posture_deg",
+    "started",
+    "temperature_c",
+    "validation",
 )
 
 
@@ -69,7 +72,18 @@ def cut_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Tabl
     name = table.text("id")
     air = locate(table, "air") if "air" in table else None
     posture = tuple(radians(each) for each in table.numbers("posture_deg", None, "deg")) if "posture_deg" in table else ()
-    return Cut(name, tooling, conditions, locate(table, "cut"), air, _last_speed(table, conditions.spindle_speed), posture)
+    return Cut(
+        name,
+        tooling,
+        conditions,
+        locate(table, "cut"),
+        air,
+        _last_speed(table, conditions.spindle_speed),
+        posture,
+        table.moment("started"),
+        table.number("temperature_c", "°C", None, least=-40.0, most=200.0),
+        table.flag("validation", False),
+    )
 
 
 def engagement_of(table: Table, cutter: Cutter, locate: Callable[[Table, str], Path]) -> AnyEngagement:

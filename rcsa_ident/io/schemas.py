@@ -113,6 +113,16 @@ _CAMPAIGNS = (
         "cuts": [
             {"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, "spindle_speed_to_rpm": 9e3, **_ANGLES, "cut": "recordings/1.h5"},
             {"id": "2", "tooling": "S1", "spindle_speed_rpm": 500.0, **_ANGLES, "cut": "recordings/2.h5", "posture_deg": [0.0, 20.0]},
+            {
+                "id": "3",
+                "tooling": "S1",
+                "spindle_speed_rpm": 500.0,
+                **_ANGLES,
+                "cut": "recordings/3.h5",
+                "started": "2026-11-27T08:15:00",
+                "temperature_c": 31.5,
+                "validation": True,
+            },
         ],
     },
     {

@@ -286,6 +286,8 @@ def campaign_of(
     if "cuts" not in top and not alone:
         top.refuse("cuts", "nothing", "tables [[cuts]], hammer tests [[frfs]], or both")
     cuts = tuple(cut_of(table, toolings, locate) for table in top.tables("cuts", CUT_KEYS)) if "cuts" in top else ()
+    if len({cut.started.tzinfo is None for cut in cuts if cut.started is not None}) > 1:
+        top.refuse("cuts", "`started` with a time zone and without one", "a time zone in each, or in none")
     tests = tuple(hammer_test_of(table, toolings, locate) for table in top.tables("frfs", HAMMER_TEST_KEYS)) if "frfs" in top else ()
     seen: dict[str, str] = {}
     for place, id in [*((f"cuts[{i}]", cut.id) for i, cut in enumerate(cuts)), *((f"frfs[{i}]", test.id) for i, test in enumerate(tests))]:

@@ -8,12 +8,15 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import Any, NoReturn
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import Range
 
 _REQUIRED: Any = object()
+#: A date with its time of day, as `datetime.fromisoformat` reads it.
+_MOMENT = r"^\d{4}-[01]\d-[0-3]\dT[0-2]\d:[0-5]\d(:[0-5]\d(\.\d+)?)?(Z|[+-]\d\d:\d\d)?$"
 
 
 @dataclass(slots=True)
@@ -224,6 +227,18 @@ class Table:
         if not isinstance(value, bool):
             self.refuse(key, describe(value), "true or false")
         return value
+
+    def moment(self, key: str) -> datetime | None:
+        """Return a date with its time of day, None where there is none."""
+        allowed = "a date and a time as 2026-11-27T08:15:00"
+        value = self.value(key, allowed, None, {"type": "string", "pattern": _MOMENT, "description": allowed})
+        if value is None or isinstance(value, datetime):
+            return value
+        try:
+            # a date alone would be midnight
+            return datetime.fromisoformat(value if "T" in value else "")
+        except (TypeError, ValueError):
+            self.refuse(key, describe(value), allowed)
 
     def one_of(self, keys: tuple[str, ...], allowed: str) -> str:
         """Return which one of `keys` is there; several or none are refused."""

@@ -17,6 +17,7 @@ from rcsa_ident.identification.cut_data import prepare
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.hammer_data import AtPoints, with_tests
 from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines, noise_of, thinned
+from rcsa_ident.identification.made_cuts import MadeCuts, in_order
 from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
@@ -300,7 +301,7 @@ def data_to_learn_from(
 ) -> IdentificationData:
     """Return usable cuts and hits of the tip as what they tell of toolings that are known as well as drawings and earlier cuts say."""
     usable = any(bool(each.measurements) for each in readings) or not tests
-    return with_rough(_data_of_cuts(campaign, readings) if usable else None, campaign, known, tests)
+    return with_rough(_data_of_cuts(campaign, readings) if usable else None, campaign, known, tests).learned_from()
 
 
 def _at_points(campaign: Campaign) -> dict[str, AtPoints]:
@@ -325,7 +326,22 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     told = [(0.0, 0.0) if s is None or s.distance is None else (s.distance, s.distance_spread) for s in sensors]
     data = with_distances(data, *np.array(told).reshape(-1, 2).T)
     known_places = not data.of_flange or all(s is not None and s.distance is not None for s in sensors)
-    return replace(data, softening_spread=campaign.softening_spread, distance_told=known_places)
+    made = _made(campaign, [each.cut_id for each in readings for _ in each.measurements])
+    if np.all(made.judged):
+        raise InputError("cuts", "usable ones for validation alone", "at least one usable cut to learn from")
+    return replace(data, softening_spread=campaign.softening_spread, distance_told=known_places, made=made)
+
+
+def _made(campaign: Campaign, ids: Sequence[str]) -> MadeCuts:
+    """When the cuts of the data were made, and which of them judge the answer."""
+    cuts = {cut.id: cut for cut in campaign.cuts}
+    used = [cuts[id] for id in ids]
+    temperature = np.array([np.nan if cut.temperature is None else cut.temperature for cut in used])
+    told = [cut.started for cut in used if cut.started is not None]
+    found = in_order(len(used))
+    seconds = np.array([(each - min(told)).total_seconds() for each in told])
+    started = seconds if seconds.size == len(used) else found.started
+    return MadeCuts(started, temperature, np.array([cut.validation for cut in used]))
 
 
 def with_rough(

@@ -14,8 +14,7 @@ from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.design import coupled_information
 from rcsa_ident.identification.cut_data import prepare
-from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.evidence import SMOOTH_ERROR
+from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.experiment_design import (
     CandidateCuts,
     compressed,

@@ -128,6 +128,8 @@ def _turning(data: IdentificationData, cut: np.ndarray, omega: FloatArray, ratio
     sums, differences = (np.zeros((2, omega.size, 4, 4), dtype=complex) for _ in range(2))
     for t, name in enumerate(data.toolings):
         own = np.flatnonzero(tooling == t)
+        if not own.size:
+            continue
         forward, backward = data.turning[name](omega[own], ratio[own])
         sums[0, own], differences[0, own] = 0.5 * (forward + backward), 0.5 * (forward - backward)
     lever = np.outer(_SCALE, _SCALE)

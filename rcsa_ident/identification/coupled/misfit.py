@@ -10,9 +10,10 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import whiten
 from rcsa_ident.identification.coupled._kernels import LineArrays, MachineArrays, PointArrays, coupled_lines
-from rcsa_ident.identification.coupled.data import CoupledData
+from rcsa_ident.identification.coupled.data import CoupledData, coupled_data
 from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, CoupledParameters, chain, skew_chain, unpack
 from rcsa_ident.identification.coupled.priors import coupled_prior_rows
+from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines
 from rcsa_ident.identification.parameters import JOINT, Unknowns, scaled_joint
 from rcsa_ident.identification.priors import PriorRows, Priors
@@ -38,6 +39,10 @@ class CoupledMisfit(Misfit):
     def with_cut_weight(self, weight: FloatArray) -> CoupledMisfit:
         """Return the misfit of the same data with other factors on the weights of the cuts' lines, shape (k,)."""
         return CoupledMisfit(self.points_data, self.priors, self.model_error, weight)
+
+    def with_data(self, data: IdentificationData, weight: FloatArray) -> CoupledMisfit:
+        """Return the misfit of other data of the same machine, with factors on the weights of its cuts' lines, shape (k,)."""
+        return CoupledMisfit(coupled_data(data), self.priors, self.model_error, weight)
 
     def prior(self, layout: Unknowns) -> PriorRows:
         """Return the priors of a layout's unknowns."""
