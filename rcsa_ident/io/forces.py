@@ -83,8 +83,8 @@ def read_forces(path: str | Path) -> ForceEstimate:
     >>> import rcsa_ident as ri
     >>> found, campaign = ri.read_result("RESULT.json"), ri.read_campaign("sample_runs")
     >>> forces = ri.estimate_forces(found, campaign.toolings["S2-PG25"], campaign.cuts[15])
-    >>> print(ri.read_forces(forces.save("FORCES.csv")))
-    X 6.66 N rms (± 3.1 N), Y 12.7 N rms (± 3.3 N) over 0.14 s
+    >>> print(ri.read_forces(forces.save("FORCES.csv")))  # doctest: +ELLIPSIS
+    X 6... N rms (± 3... N), Y 12... N rms (± 3... N) over 0.14 s
     """
     time, force, deviation = read_forces_csv(path)
     step = float(np.mean(np.diff(time))) if time.size > 1 else 0.0

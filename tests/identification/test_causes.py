@@ -19,8 +19,9 @@ THETA = vector_of(LAYOUT, ((600.0, 1400.0, 2600.0), (700.0, 1500.0, 2500.0)))
 NOISE = 2e-3
 
 
-def made(data, theta_of, factor=None, seed=4):
-    """The same cuts with lines of a model that is another one in each cut, and a noise that the data know."""
+def made(data, theta_of, factor=None, seed=4, loud=None):
+    """The same cuts with lines of a model that is another one in each cut, and a noise that the data know; less of it in loud cuts."""
+    level = NOISE / (np.ones(len(data.cut_ids)) if loud is None else loud)
     rng = np.random.default_rng(seed)
     misfit = Misfit(data, Priors(), (0.0,) * len(data.axes))
     models = [np.zeros((axis.omega.size, axis.outputs), dtype=complex) for axis in data.axes]
@@ -32,8 +33,8 @@ def made(data, theta_of, factor=None, seed=4):
         if factor is not None:
             model = model * factor(i, axis)[:, None]
         noise = rng.standard_normal(model.shape) + 1j * rng.standard_normal(model.shape)
-        lines = model + NOISE / np.sqrt(2.0) * np.abs(model) * noise
-        variance = 0.5 * (NOISE * np.abs(model)) ** 2
+        deviation = level[axis.cut][:, None] / np.sqrt(2.0) * np.abs(model)
+        lines, variance = model + deviation * noise, deviation**2
         axes.append(replace(axis, lines=np.stack([lines, np.zeros_like(lines)], axis=2), variance=variance))
     return replace(data, axes=tuple(axes))
 
@@ -103,6 +104,61 @@ def test_the_cause_is_named_first(few, cause):
     assert told.without < 1e-3
     if cause is Cause.ORDER:
         assert with_orders(found, misfit) < evidence(found, misfit) - BELIEVED
+
+
+def heated(data):
+    """Warmth of bearings whose housing warms up, too, as each cut begins; the heat is that of its speed."""
+    step, warmth = 1.0, np.zeros(len(data.cut_ids))
+    bearing = housing = 0.0
+    for k, speed in enumerate(data.spindle_speed / data.spindle_speed.max()):
+        for _ in range(90):
+            flow = bearing - housing
+            bearing, housing = bearing + step / 900.0 * (speed**1.4 - flow), housing + step / 5400.0 * (flow - 4.0 * housing)
+        warmth[k] = bearing
+    return warmth
+
+
+def moving(course):
+    return lambda k: np.concatenate([THETA[:3] + 0.02 * course[k] * np.array([1.0, 0.5, 0.7]), THETA[3:]])
+
+
+def shuffled(data):
+    """The same cuts in random order."""
+    order = np.random.default_rng(5).permutation(len(data.cut_ids))
+    return replace(data, made=replace(data.made, started=90.0 * np.argsort(order).astype(float)))
+
+
+def test_heat_of_friction_is_told_from_what_else_changes(few):
+    """Speeds at random: the warmth follows them late, which neither time nor speed alone explains."""
+    data = shuffled(few)
+    order = np.argsort(data.made.started)
+    course = np.empty(order.size)
+    course[order] = heated(replace(few, spindle_speed=few.spindle_speed[order]))
+    told = asked(made(data, moving(course)))[2]
+    assert told.found[0].cause is Cause.TIME
+    assert told.found[0].evidence > BELIEVED
+
+
+def test_a_thermometer_is_asked(few):
+    course = np.random.default_rng(6).uniform(-1.0, 1.0, len(few.cut_ids))
+    warm = replace(few, made=replace(few.made, temperature=30.0 + 8.0 * course))
+    told = asked(made(warm, moving(course)))[2]
+    assert told.found[0].cause is Cause.TEMPERATURE
+    assert told.found[0].evidence > BELIEVED
+    assert Cause.TEMPERATURE not in {each.cause for each in asked(made(few, moving(course)))[2].found}
+
+
+def test_a_joint_that_gives_way_in_loud_cuts(few):
+    loud = np.exp(np.random.default_rng(8).uniform(-1.0, 1.0, len(few.cut_ids)))
+
+    def softer(k):
+        moved = THETA.copy()
+        moved[LAYOUT.joint][:2] -= 0.06 * np.log(loud[k])
+        return moved
+
+    told = asked(made(few, softer, loud=loud))[2]
+    assert told.found[0].cause is Cause.AMPLITUDE
+    assert told.found[0].evidence > BELIEVED
 
 
 def test_sensors_that_look_elsewhere_than_told(few):

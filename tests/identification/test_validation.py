@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.validation import Prediction, predictions, validated, widening
+from rcsa_ident.identification.validation import Prediction, judged, predictions, validated, widening
 from tests.identification.test_causes import asked, made, steady
 
 
@@ -26,6 +26,24 @@ def test_one_tooling_is_compared_with_nothing(few):
     found, misfit, _ = asked(made(alone, steady))
     assert predictions(found, misfit) == ()
     assert not validated(())
+
+
+def test_cuts_that_judge_take_no_part(few):
+    data = made(few, steady)
+    aside = (few.cut_tooling == 1) & (np.arange(len(few.cut_ids)) % 2 == 1)
+    whole = replace(data, made=replace(data.made, judged=aside))
+    learned = whole.learned_from()
+    assert len(learned.cut_ids) == np.sum(~aside)
+    found, misfit, _ = asked(learned)
+    told = judged(found, misfit, whole)
+    assert {(each.tooling, each.axis) for each in told} == {(few.toolings[1], axis) for axis in (Dof.X, Dof.Y)}
+    assert all(each.holds for each in told)
+    wrong = [np.where(aside[axis.cut][:, None, None], 1.1, 1.0) * axis.lines for axis in whole.axes]
+    off = replace(whole, axes=tuple(replace(axis, lines=lines) for axis, lines in zip(whole.axes, wrong, strict=True)))
+    for each in judged(found, misfit, off):
+        assert each.error == pytest.approx(0.1, rel=0.3)
+        assert not each.holds
+    assert judged(found, misfit, learned) == ()
 
 
 @pytest.mark.parametrize(("error", "factor"), [(0.019, 1.0), (0.05, 5.0)])
