@@ -169,7 +169,8 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
     tests = [_hammer_test(test, rows) for test in data.get("frfs", ())]
     remarks, rough = _told(campaign)
-    usable = [(cut.tooling, cut.verdict.windows) for cut in cuts if cut.verdict is not None and cut.verdict.usable]
+    usable = [(cut, cut.verdict.windows) for cut in cuts if cut.verdict is not None and cut.verdict.usable]
+    learned = [cut.tooling for cut, windows in usable if not cut.validation for _ in range(windows)]
     return CampaignAnswer(
         id=campaign.id,
         machine=campaign.machine,
@@ -184,7 +185,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         remarks=remarks,
         rough_toolings=rough,
         # hammer tests help, and tell by their spreads what they leave open
-        too_few=None if tests else too_few((tooling for tooling, windows in usable for _ in range(windows)), _sees_flange(data["sensors"])),
+        too_few=None if tests else too_few(learned, _sees_flange(data["sensors"])),
         cuts=cuts,
         hammer_tests=tests,
     )

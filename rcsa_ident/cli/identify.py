@@ -66,7 +66,8 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
     usable = sum(row.usable for row in rows)
     # each window of a pass is a cut of its own
     of_flange = not any(measurement.housing for each in readings for measurement in each.measurements)
-    few = too_few((each.tooling for each in readings for _ in each.measurements), of_flange)
+    judges = {cut.id for cut in campaign.cuts if cut.validation}
+    few = too_few((each.tooling for each in readings if each.cut_id not in judges for _ in each.measurements), of_flange)
     if json_:
         told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "too_few": few}
         told |= {"left_open": list(open_), "warnings": list(remarks)}

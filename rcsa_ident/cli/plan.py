@@ -192,8 +192,19 @@ def plan_text(planned: PlannedCuts) -> str:
     from rcsa_ident.io.cuts import cut_keys
     from rcsa_ident.io.toml_text import toml_of
 
-    named = zip(_names(planned), planned.cuts, strict=True)
-    return toml_of({"cuts": [cut_keys(name, cut.tooling, cut.conditions) for name, cut in named]}, digits=9)
+    cuts = [cut_keys(name, cut.tooling, cut.conditions) for name, cut in zip(_names(planned), planned.cuts, strict=True)]
+    text = toml_of({"cuts": cuts}, digits=9)
+    if planned.judges:
+        judges = [cut_keys(_judge(cut), cut.tooling, cut.conditions) | {"validation": True} for cut in planned.judges]
+        # a campaign does not know these toolings yet
+        lines = ["To judge the answer, once [toolings] names their toolings:", *toml_of({"cuts": judges}, digits=9).splitlines()]
+        text += "\n" + "".join(f"# {line}".rstrip() + "\n" for line in lines)
+    return text
+
+
+def _judge(cut: PlannedCut) -> str:
+    """The id of a cut that judges the answer."""
+    return f"{cut.tooling}-validation"
 
 
 def _names(planned: PlannedCuts) -> list[str]:
@@ -297,6 +308,7 @@ def _summary(planned: PlannedCuts, wanted: float | None) -> dict[str, Any]:
         "candidates": planned.candidates,
         "unstable": planned.unstable,
         "warnings": list(planned.warnings),
+        "validation": [_row(_judge(cut), cut) for cut in planned.judges],
     }
     if wanted is not None:
         enough = planned.fewest(wanted)
@@ -334,3 +346,9 @@ def _show(planned: PlannedCuts) -> None:
         f"chosen from {planned.candidates} stable cuts ({planned.unstable} more may chatter); "
         f"as many at even distances would come to {even}"
     )
+    for cut in planned.judges:
+        c = cut.conditions
+        console().print(
+            f"to judge the answer: {escape(cut.tooling)} at {to_rpm(c.spindle_speed):.0f} rev/min, {c.axial_depth * 1e3:g} mm, "
+            "as a cut with validation = true"
+        )

@@ -15,11 +15,11 @@ from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.causes import Causes, causes
 from rcsa_ident.identification.coupled.data import CoupledData
-from rcsa_ident.identification.coupled.parameters import CoupledLayout
+from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.identification.coupled.score import Coupling
 from rcsa_ident.identification.data import LEVER, IdentificationData
-from rcsa_ident.identification.diagnostics import because, deviation_of_tip, diagnose, not_as_predicted, remarks, two_solutions
+from rcsa_ident.identification.diagnostics import because, deviation_of_tip, diagnose, not_as_predicted, not_judged, remarks, two_solutions
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
@@ -49,6 +49,11 @@ MOSTLY_PASSES = (
 )
 HOUSING_LEFT_OUT = (
     "X and Y feel each other, and both together are fitted to the flange's motion alone: the accelerometers on the housing were not used"
+)
+#: Directions of modes that are turned less leave the planes apart [rad].
+TURNED = np.radians(5.0)
+NOT_TURNED = (
+    "X and Y feel each other, but no mode is turned by 5 degrees out of them: cross-talk of the sensors and wrong forces look like that"
 )
 #: Toolings that contradict each other where the flange's sensors look elsewhere than at the flange.
 ENOUGH_FOR_DISTANCE = 3
@@ -146,6 +151,8 @@ class Fit(ABC):
         assert evaluation.linear is not None
         reasons, notes = self.doubts()
         reasons = [*because(self.causes), *reasons, *not_as_predicted(self.predictions)]
+        if not validated(self.predictions):
+            notes = [not_judged(self.predictions), *notes]
         if not data.distance_told and len(self._compared) < ENOUGH_FOR_DISTANCE:
             notes = [Remark(IdentificationCode.DISTANCE_UNTOLD, DISTANCE_UNTOLD), *notes]
         if 2 * data.swept_cuts > data.cuts:
@@ -375,11 +382,19 @@ class CoupledFit(Fit):
         natural = {"X and Y": self.posterior.best.standing().omega_n}
         found = remarks(self.data, self.solution, self.misfit, self.covariance, natural)
         told = [Remark(IdentificationCode.PLANES_COUPLED, self._in_words(value))]
+        if _coupled(self.solution).turning == 0 and self._turned() < TURNED:
+            told.append(Remark(IdentificationCode.NOT_TURNED, NOT_TURNED))
         if self.data.beside:
             told.append(Remark(IdentificationCode.HOUSING_LEFT_OUT, HOUSING_LEFT_OUT))
         if self._gain_of_another_feed() > WORTH:
             told.append(Remark(IdentificationCode.ONE_FEED, ANOTHER_FEED))
         return reasons, [*told, *found]
+
+    def _turned(self) -> float:
+        """By how much the mode that is turned most is turned out of X and Y [rad]."""
+        squares = unpack(self.solution.theta, _coupled(self.solution)).psi ** 2
+        x, y = squares[:, :2].sum(axis=1), squares[:, 2:].sum(axis=1)
+        return float(np.arctan(np.sqrt(np.max(np.minimum(x, y) / np.maximum(np.maximum(x, y), 1e-300)))))
 
     def _gain_of_another_feed(self) -> float:
         """How much better both planes would be told apart if half of the cuts were fed at right angles."""

@@ -29,6 +29,11 @@ from rcsa_ident.remarks import Remark, says
 WORST_MODEL_ERROR, WORST_OF_ROUGH = 0.005, 0.02
 #: Solutions whose evidence lies closer than this are told apart by chance only.
 EVIDENCE_TIE = 6.0
+NOTHING_JUDGES = (
+    "fewer than three toolings judge each other only roughly: one cut with a further one, marked `validation = true`, judges the answer"
+)
+#: Modes of an axis beyond which some of them stand for what is not in the model.
+MOST_MODES = 12
 #: Relative difference of two such solutions, and deviation of the answer, from which on they matter.
 LARGEST_DIFFERENCE, LARGEST_BAND = 0.02, 0.01
 #: Share of the cuts that may contradict the others before the whole is in doubt.
@@ -219,6 +224,15 @@ def not_as_predicted(found: Sequence[Prediction]) -> list[Remark]:
     ]
 
 
+def not_judged(found: Sequence[Prediction]) -> Remark:
+    """Return why nothing judges an answer."""
+    widest = max((each.promised for each in found), default=np.inf)
+    words = NOTHING_JUDGES
+    if np.isfinite(widest):
+        words = f"the other toolings promise a tooling's lines to {100.0 * widest:.2g} % alone; {NOTHING_JUDGES}"
+    return Remark(IdentificationCode.NOT_JUDGED, words)
+
+
 def two_solutions(data: IdentificationData, searched: Sequence[AxisSearch]) -> list[Remark]:
     """Return for which axes two answers of equal evidence differ, and by how much; or the two likeliest of searches that do not agree.
 
@@ -278,6 +292,10 @@ def remarks(
     low = min(float(axis.omega.min()) for axis in data.axes) / (2.0 * np.pi)
     high = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
     for name, omega_n in natural.items():
+        most = MOST_MODES * len(name.split(" and "))
+        if omega_n.size > most:
+            words = f"{name}: the answer has {omega_n.size} modes, more than {most}: modes beyond those of a spindle stand for other errors"
+            note(IdentificationCode.MANY_MODES, words)
         frequency = omega_n / (2.0 * np.pi)
         outside = np.sort(frequency[(frequency < low) | (frequency > high)])
         if outside.size:

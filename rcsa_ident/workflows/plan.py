@@ -157,6 +157,8 @@ class PlannedCuts:
         Cuts to choose from, and those that were left out since they may chatter.
     warnings : tuple of str
         What did not go as it was asked for.
+    judges : tuple of PlannedCut
+        One stable cut with each target that is not cut with otherwise: nothing is learned from it, it judges the answer.
     """
 
     cuts: tuple[PlannedCut, ...]
@@ -167,6 +169,7 @@ class PlannedCuts:
     candidates: int
     unstable: int
     warnings: tuple[str, ...] = ()
+    judges: tuple[PlannedCut, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", frozen(self.band))
@@ -254,7 +257,24 @@ def plan_cuts(
         len(candidates),
         unstable,
         tuple(warnings),
+        _judges(machine, toolings, targets, allowed, coefficients),
     )
+
+
+def _judges(
+    machine: IdentifiedMachine,
+    toolings: Sequence[Tooling],
+    targets: Sequence[Tooling],
+    allowed: CutConstraints,
+    coefficients: CuttingCoefficients,
+) -> tuple[PlannedCut, ...]:
+    """The deepest stable cut, and of these the one nearest to the middle of the speeds, with each target that is not cut with."""
+    made, middle, found = {tooling.name for tooling in toolings}, float(np.sqrt(allowed.lowest * allowed.highest)), []
+    for target in targets:
+        if target.name not in made:
+            cuts, _, _ = _candidates(machine, [target], allowed, coefficients)
+            found += sorted(cuts, key=lambda cut: (-cut.conditions.axial_depth, abs(cut.conditions.spindle_speed - middle)))[:1]
+    return tuple(found)
 
 
 def alternating(allowed: CutConstraints, toolings: Sequence[Tooling], coefficients: CuttingCoefficients) -> CutConstraints:

@@ -86,6 +86,10 @@ def test_the_plan_is_a_piece_of_a_campaign_file(tmp_path):
         assert conditions.axial_depth in (1e-4, 2e-4)
         assert conditions.feed_angle == pytest.approx(-0.5 * np.pi)
         assert np.degrees([conditions.engagement.entry, conditions.engagement.exit]) == pytest.approx([90.0, 150.0])
+    # a cut with the tooling that is wanted judges the answer
+    assert "to judge the answer: S4-shrink at" in shown.stdout
+    (judge,) = tomllib.loads(text.replace("# To judge", "## To judge").replace("\n# ", "\n"))["cuts"][3:]
+    assert (judge["tooling"], judge["validation"]) == ("S4-shrink", True)
 
 
 @pytest.mark.slow
