@@ -13,22 +13,24 @@ twice the logarithm of how much likelier the lines are with the cause than witho
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.data import LEVER, IdentificationData
-from rcsa_ident.identification.levenberg_marquardt import Solution
+from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.linearisation import Linearisation, Residual
 from rcsa_ident.identification.made_cuts import USUAL_PAUSE
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.model_order import evidence
-from rcsa_ident.identification.parameters import JOINT
+from rcsa_ident.identification.model_order import cut_weights, evidence, model_error
+from rcsa_ident.identification.parameters import JOINT, planes
 
+#: Steps of a polish with further unknowns, and how often the noise is learned anew.
+_STEPS, _NOISES = 60, 3
 #: Evidence above which a cause is believed.
-BELIEVED = 15.0
+BELIEVED = 25.0
 #: Time constants of the warmth that is asked for [s], and the exponent of the speed in the heat of friction.
 _CONSTANTS, _FRICTION = (450.0, 900.0, 1800.0), 1.25
 #: Spreads: of a natural frequency from the first to the last cut and over the speeds, of a cut's scale, of the force in an order of the
@@ -136,9 +138,26 @@ def causes(solution: Solution, misfit: Misfit, wider: float = 1.0) -> Causes:
 
 
 def with_orders(solution: Solution, misfit: Misfit) -> float:
-    """Return minus twice the log evidence of an answer [-], with factors on the forces of the teeth's orders where that is likelier."""
-    gains = [each.evidence for each in causes(solution, misfit).found if each.cause is Cause.ORDER]
-    return evidence(solution, misfit) - max([0.0, *gains])
+    """Return minus twice the log evidence of an answer [-], with factors on the forces of the teeth's orders where that is likelier.
+
+    A factor is one for all toolings: the law of the chip, the edge's force and the angle of entry are much the same for them.
+    """
+    data, layout = misfit.data, planes(solution.layout)
+    orders = [np.rint(axis.order).astype(np.intp) for axis in data.axes]
+    known = {key: k for k, key in enumerate((i, m) for i, own in enumerate(orders) for m in np.unique(own).tolist())}
+    slopes = [np.zeros((own.size, 2 * len(known)), dtype=complex) for own in orders]
+    for i, (own, slope) in enumerate(zip(orders, slopes, strict=True)):
+        at = np.array([known[i, m] for m in own.tolist()], dtype=np.intp)
+        slope[np.arange(own.size), 2 * at], slope[np.arange(own.size), 2 * at + 1] = 1.0, 1j
+    further = misfit.with_data(data.with_unknowns((_ORDER,) * (2 * len(known)), slopes), misfit.cut_weight)
+    more = replace(layout, coefficients=layout.coefficients + 2 * len(known))
+    start = np.insert(solution.theta, layout.force.stop, np.zeros(2 * len(known)))
+    found = refine(further, start, more, solution.evaluation.nuisance, _STEPS)
+    for _ in range(_NOISES):
+        # with the right forces less is left unexplained
+        further = misfit.with_data(further.data, cut_weights(found, further), model_error(found, further))
+        found = refine(further, found.theta, more, found.evaluation.nuisance, _STEPS)
+    return min(evidence(solution, misfit), evidence(found, further))
 
 
 def _bordered(
@@ -185,12 +204,13 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
             found.append(columns.reshape(len(own), -1))
         return found
 
-    orders = [[(i, t, m) for t, m in zip(tooling[i].tolist(), order[i].tolist(), strict=True)] for i in axes]
+    # for all toolings alike, or for each its own
+    orders = [[[(i, t * each, m) for t, m in zip(tooling[i].tolist(), order[i].tolist(), strict=True)] for i in axes] for each in (0, 1)]
     cuts = [[(k,) for k in own.tolist()] for own in cut]
     found = {
         Cause.TIME: [drift(course) for course in _courses(data)],
         Cause.SPEED: [drift(misfit.relative_speed)],
-        Cause.ORDER: [by_key(orders, [(_ORDER * real, _ORDER * turned) for real, turned in model])],
+        Cause.ORDER: [by_key(keys, [(_ORDER * real, _ORDER * turned) for real, turned in model]) for keys in orders],
         Cause.SCALE: [by_key(cuts, [(_SCALE * real,) for real, _ in model])],
         Cause.CLAMPING: [[np.hstack([_CLAMPING * stiffness[i] * (tooling[i] == t)[:, None] for t in toolings]) for i in axes]],
     }

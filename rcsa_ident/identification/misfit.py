@@ -111,9 +111,9 @@ class Misfit:
         """Return the misfit of the same data with other factors on the weights of the cuts' lines, shape (k,)."""
         return Misfit(self.data, self.priors, self.model_error, weight)
 
-    def with_data(self, data: IdentificationData, weight: FloatArray) -> Misfit:
+    def with_data(self, data: IdentificationData, weight: FloatArray, error: tuple[float, ...] | None = None) -> Misfit:
         """Return the misfit of other data of the same machine, with factors on the weights of its cuts' lines, shape (k,)."""
-        return Misfit(data, self.priors, self.model_error, weight)
+        return Misfit(data, self.priors, self.model_error if error is None else error, weight)
 
     @property
     def points(self) -> int:

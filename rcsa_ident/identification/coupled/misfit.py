@@ -40,9 +40,9 @@ class CoupledMisfit(Misfit):
         """Return the misfit of the same data with other factors on the weights of the cuts' lines, shape (k,)."""
         return CoupledMisfit(self.points_data, self.priors, self.model_error, weight)
 
-    def with_data(self, data: IdentificationData, weight: FloatArray) -> CoupledMisfit:
+    def with_data(self, data: IdentificationData, weight: FloatArray, error: tuple[float, ...] | None = None) -> CoupledMisfit:
         """Return the misfit of other data of the same machine, with factors on the weights of its cuts' lines, shape (k,)."""
-        return CoupledMisfit(coupled_data(data), self.priors, self.model_error, weight)
+        return CoupledMisfit(coupled_data(data), self.priors, self.model_error if error is None else error, weight)
 
     def prior(self, layout: Unknowns) -> PriorRows:
         """Return the priors of a layout's unknowns."""
