@@ -226,10 +226,10 @@ def not_as_predicted(found: Sequence[Prediction]) -> list[Remark]:
 
 def not_judged(found: Sequence[Prediction]) -> Remark:
     """Return why nothing judges an answer."""
-    widest = max((each.promised for each in found), default=np.inf)
+    widest = max((each.typical for each in found), default=np.inf)
     words = NOTHING_JUDGES
     if np.isfinite(widest):
-        words = f"the other toolings promise a tooling's lines to {100.0 * widest:.2g} % alone; {NOTHING_JUDGES}"
+        words = f"the other toolings promise half of a tooling's lines to {100.0 * widest:.2g} % alone; {NOTHING_JUDGES}"
     return Remark(IdentificationCode.NOT_JUDGED, words)
 
 

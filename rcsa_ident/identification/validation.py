@@ -29,8 +29,8 @@ _NO_PART = 1e-10
 _STEPS, _GRID = 60, 32
 #: Errors up to so many times what was promised are as promised: 95 % of them.
 WITHIN = 2.0
-#: A promise beyond this says nothing.
-TOO_WIDE = 1.0
+#: Where half of the lines are promised no better than this, nothing is.
+TOO_WIDE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +45,15 @@ class Prediction:
         Norm of the difference over that of what was measured.
     promised : float [-]
         The same as bands and noise promise it: the root mean square.
+    typical : float [-]
+        Promised deviation of a line over its size: the median. A few lines at a resonance make the root mean square.
     """
 
     tooling: str
     axis: Dof
     error: float
     promised: float
+    typical: float
 
     @property
     def holds(self) -> bool:
@@ -121,7 +124,7 @@ def _finite(found: Iterable[Prediction]) -> tuple[Prediction, ...]:
 def validated(found: Sequence[Prediction]) -> bool:
     """Return whether every axis was predicted, by a promise that says something."""
     axes = {each.axis for each in found}
-    return bool(axes) and all(any(each.axis is axis and each.promised <= TOO_WIDE for each in found) for axis in axes)
+    return bool(axes) and all(any(each.axis is axis and each.typical <= TOO_WIDE for each in found) for axis in axes)
 
 
 def widening(found: Sequence[Prediction]) -> float:
@@ -150,9 +153,10 @@ def _predicted(solution: Solution, misfit: Misfit, own: np.ndarray, kept: np.nda
             continue
         off = np.sum((there.residual.lines[i].reshape(2, -1) / root) ** 2, axis=0)[lines]
         promised = np.sum(doubt[i].reshape(2, -1) / root**2, axis=0)[lines] + 2.0 * axis.variance.ravel()[lines]
-        size = float(np.sum(np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]).ravel()[lines] ** 2))
-        error, promise = (float(np.sqrt(np.sum(each) / max(size, 1e-300))) for each in (off, promised))
-        rows.append(Prediction(data.toolings[data.cut_tooling[own][0]], axis.axis, error, promise))
+        size = np.maximum(np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]).ravel()[lines] ** 2, 1e-300)
+        error, promise = (float(np.sqrt(np.sum(each) / np.sum(size))) for each in (off, promised))
+        typical = float(np.sqrt(np.median(promised / size)))
+        rows.append(Prediction(data.toolings[data.cut_tooling[own][0]], axis.axis, error, promise, typical))
     return rows
 
 

@@ -48,11 +48,11 @@ def test_cuts_that_judge_take_no_part(few):
 
 @pytest.mark.parametrize(("error", "factor"), [(0.019, 1.0), (0.05, 5.0)])
 def test_bands_are_widened_to_what_was_seen(error, factor):
-    seen = (Prediction("A", Dof.X, error, 0.01), Prediction("B", Dof.X, 0.005, 0.01))
+    seen = (Prediction("A", Dof.X, error, 0.01, 0.02), Prediction("B", Dof.X, 0.005, 0.01, 0.02))
     assert widening(seen) == pytest.approx(factor)
 
 
 def test_every_axis_needs_a_promise_that_says_something():
-    seen = Prediction("A", Dof.X, 0.01, 0.01)
+    seen = Prediction("A", Dof.X, 0.01, 0.01, 0.02)
     assert validated((seen,))
-    assert not validated((seen, replace(seen, axis=Dof.Y, promised=2.0)))
+    assert not validated((seen, replace(seen, axis=Dof.Y, typical=0.6)))
