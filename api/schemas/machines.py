@@ -132,12 +132,20 @@ class Mode(Answer):
     phi_r: list[float] = Field(description="Real and imaginary part of the slope.")
 
 
+class Prediction(Answer):
+    """How the lines of a tooling are predicted by the others, or of a cut that judges the answer."""
+
+    error: float = Field(description="Norm of the difference over that of what was measured.")
+    promised: float = Field(description="The same as bands and noise promise it.")
+
+
 class AxisModes(Answer):
     """One axis of an identification."""
 
     modes: list[Mode]
     joint: dict[str, float]
     misfit_per_point: float | None
+    validation: dict[str, Prediction] = Field({}, description="By tooling; empty where nothing could be compared.")
 
 
 class SideMode(Answer):

@@ -89,6 +89,7 @@ def modes(text: str) -> dict[str, Any]:
     for name, axis in data["axes"].items():
         rows = [{key: mode.get(key) for key in _MODE} for mode in axis["modes"]]
         axes[name] = {"modes": rows, "joint": axis["joint"], "misfit_per_point": axis.get("misfit", {}).get("chi2_per_point")}
+        axes[name] |= {"validation": axis.get("validation", {})}
     whole = data.get("both_planes")
     both = None
     if whole is not None:

@@ -209,7 +209,8 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
     cuts = [[(k,) for k in own.tolist()] for own in cut]
     found = {
         Cause.TIME: [drift(course) for course in _courses(data)],
-        Cause.SPEED: [drift(misfit.relative_speed)],
+        # the model follows a straight line, as well as its prior lets it
+        Cause.SPEED: [drift(misfit.relative_speed), drift(1.5 * misfit.relative_speed**2 - 0.5)],
         Cause.ORDER: [by_key(keys, [(_ORDER * real, _ORDER * turned) for real, turned in model]) for keys in orders],
         Cause.SCALE: [by_key(cuts, [(_SCALE * real,) for real, _ in model])],
         Cause.CLAMPING: [[np.hstack([_CLAMPING * stiffness[i] * (tooling[i] == t)[:, None] for t in toolings]) for i in axes]],

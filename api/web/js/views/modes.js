@@ -60,7 +60,30 @@ const columns = (band) => [
 ];
 
 /** A card for each axis, or one for both where they feel each other; then what gives way on the workpiece's side, where somebody looked. */
-export const modesCards = (modes) => [...spindleCards(modes), ...workpieceCard(modes)];
+export const modesCards = (modes) => [...spindleCards(modes), ...validationCard(modes), ...workpieceCard(modes)];
+
+const percent = (share) => significant(100 * share, 2);
+const PREDICTED = [
+  { name: "Tooling", cell: ({ tooling }) => tooling },
+  { name: "Axis", cell: ({ axis }) => axis },
+  { name: "Error of its lines", unit: "%", number: true, cell: ({ found }) => percent(found.error) },
+  { name: "Promised", unit: "%", number: true, cell: ({ found }) => percent(found.promised) },
+];
+
+function validationCard(modes) {
+  const rows = Object.entries(modes.axes).flatMap(([axis, { validation }]) =>
+    Object.entries(validation ?? {}).map(([tooling, found]) => ({ tooling, axis, found })),
+  );
+  if (!rows.length) return [];
+  return [
+    card(
+      "Validation",
+      null,
+      table("Predicted lines", PREDICTED, rows),
+      h("p", { class: "small soft" }, "The answer without a tooling predicts that tooling's lines. Bands and noise make the promise."),
+    ),
+  ];
+}
 
 const SIDE = [
   { name: "Axis", cell: ({ axis }) => axis },
