@@ -11,7 +11,8 @@ from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.data import LEVER, AxisData, CutPrior, IdentificationData, Turning, nodes
+from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData, Turning, nodes
+from rcsa_ident.identification.made_cuts import CutPrior
 from rcsa_ident.identification.status import FEWEST_OF_HOUSING, FEWEST_TOOLINGS
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
-from rcsa_ident.identification.made_cuts import MadeCuts, in_order
+from rcsa_ident.identification.made_cuts import CutPrior, MadeCuts, in_order
 from rcsa_ident.identification.rough_toolings import RoughLines, placed
 from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING
 from rcsa_ident.signals.motion import FLANGE_ALONE, ONE_PLACE, searched, usual_shares
@@ -206,52 +205,6 @@ class AxisData:
 def nodes(sweep: FloatArray) -> FloatArray:
     """Return how far from the middle of each line's range its tool-holder is asked, shape (n,) [rad/s]; `sweep` as in `AxisData`."""
     return NODE * 0.5 * np.abs(sweep[:, 0]) * sweep[:, 1]
-
-
-@dataclass(frozen=True, eq=False)
-class CutPrior:
-    """What is known beforehand of each cut's delay and of the angle to its air cut; arrays of shape (k,).
-
-    Parameters
-    ----------
-    delay : array [s]
-        From a trigger of known tooth angle.
-    delay_weight : array [1/s^2]
-        Inverse variance of it; 0 without such a trigger.
-    angle_weight : array [1/rad^2]
-        Inverse variance of the angle between cut and air cut, whose mean is 0.
-    tooth_period : array [s]
-        In which the delay may lie anywhere where nothing is known of it: a turn where teeth are unlike.
-    pitches : array
-        How many teeth pass in it; by default one.
-    """
-
-    delay: FloatArray
-    delay_weight: FloatArray
-    angle_weight: FloatArray
-    tooth_period: FloatArray
-    pitches: FloatArray = field(default=None)  # type: ignore[arg-type]
-
-    def __post_init__(self) -> None:
-        if self.pitches is None:
-            object.__setattr__(self, "pitches", np.ones_like(self.delay))
-        for each in fields(self):
-            object.__setattr__(self, each.name, frozen(getattr(self, each.name)))
-
-    @cached_property
-    def weights(self) -> FloatArray:
-        """Weights of delay and angle, shape (k, 2)."""
-        return np.stack([self.delay_weight, self.angle_weight], axis=1)
-
-    @property
-    def columns(self) -> FloatArray:
-        """All side by side, shape (k, 5)."""
-        return np.stack([getattr(self, each.name) for each in fields(self)], axis=1)
-
-    @cached_property
-    def rows(self) -> FloatArray:
-        """The first four side by side, as the kernel takes them, shape (k, 4)."""
-        return np.stack([self.delay, self.delay_weight, self.angle_weight, self.tooth_period], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,8 +11,9 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.data import LEVER, AxisData, CutPrior, IdentificationData
+from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.hammer_lines import HammerLines
+from rcsa_ident.identification.made_cuts import CutPrior
 from rcsa_ident.tool_holder.model import point_name
 
 #: Standard deviations of a hammer test's gain, and of its channels' delay to each other [s].

@@ -334,14 +334,15 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
 
 def _made(campaign: Campaign, ids: Sequence[str]) -> MadeCuts:
     """When the cuts of the data were made, and which of them judge the answer."""
-    cuts = {cut.id: cut for cut in campaign.cuts}
-    used = [cuts[id] for id in ids]
-    temperature = np.array([np.nan if cut.temperature is None else cut.temperature for cut in used])
-    told = [cut.started for cut in used if cut.started is not None]
-    found = in_order(len(used))
-    seconds = np.array([(each - min(told)).total_seconds() for each in told])
-    started = seconds if seconds.size == len(used) else found.started
-    return MadeCuts(started, temperature, np.array([cut.validation for cut in used]))
+    cuts = {cut.id: cut for cut in campaign.cuts if cut.id in ids}
+    warm = {id: cut.temperature for id, cut in cuts.items() if cut.temperature is not None}
+    began = {id: cut.started for id, cut in cuts.items() if cut.started is not None}
+    found = in_order(len(ids))
+    if all(id in began for id in ids):
+        first = min(began.values())
+        found = replace(found, started=np.array([(began[id] - first).total_seconds() for id in ids]))
+    judged = np.array([id in cuts and cuts[id].validation for id in ids])
+    return replace(found, temperature=np.array([warm.get(id, np.nan) for id in ids]), judged=judged)
 
 
 def with_rough(

@@ -116,7 +116,7 @@ def put(data: dict, path: str, value: object) -> dict:
 BROKEN = [
     ("schema_version", 2, ["schema_version", "found 2", "allowed is 1"]),
     ("schema_version", None, ["schema_version", "found nothing"]),
-    ("status", "done", ["status", '"done"', "converged, suspect, failed"]),
+    ("status", "done", ["status", '"done"', "converged, not validated, suspect, failed"]),
     ("reasons", "none", ["reasons", "a list of texts"]),
     ("seed", -1, ["seed", "found -1", "a whole number at least 0"]),
     ("method", None, ["method", "found nothing"]),
