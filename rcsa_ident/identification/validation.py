@@ -2,8 +2,8 @@
 
 Each tooling in turn is left out: from the whole answer the others are polished without it, and its lines are predicted. What belongs to
 the cutter's clamping alone, its run-out and its tooth angle, is taken from the whole answer, and each cut's delay is its own; all else,
-what its drawing does not tell included, is what the other toolings say. Cuts that were made to judge the answer took no part from the
-first.
+what its drawing does not tell included, is what the other toolings say. In directions that these hardly tell, the polish hardly leaves the
+whole answer: what was promised is the measure of that. Cuts that were made to judge the answer took no part from the first.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from rcsa_ident.identification.swept import unswept
 
 #: Weight of cuts that take no part: their delays are still fitted.
 _NO_PART = 1e-10
-#: Steps of the polish without a tooling, and delays that are tried over a tooth's pitch.
-_STEPS, _GRID = 60, 32
+#: Steps of the polish without a tooling, the relative gain below which it ends, and delays that are tried over a tooth's pitch.
+_STEPS, _GAIN, _GRID = 100, 1e-6, 32
 #: Errors up to so many times what was promised are as promised: 95 % of them.
 WITHIN = 2.0
 #: Where half of the lines are promised no better than this, nothing is.
@@ -137,7 +137,7 @@ def _predicted(solution: Solution, misfit: Misfit, own: np.ndarray, kept: np.nda
     data, layout = misfit.data, solution.layout
     aside = own | np.pad(data.made.judged, (0, own.size - data.cuts))
     without = misfit.with_cut_weight(np.where(aside, _NO_PART, misfit.cut_weight))
-    found = refine(without, solution.theta, layout, solution.evaluation.nuisance, _STEPS)
+    found = refine(without, solution.theta, layout, solution.evaluation.nuisance, _STEPS, tolerance=_GAIN)
     theta = found.theta.copy()
     theta[kept] = solution.theta[kept]
     there = misfit.evaluate(theta, layout, solution.evaluation.nuisance, normal=True)
