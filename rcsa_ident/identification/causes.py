@@ -31,6 +31,8 @@ from rcsa_ident.identification.parameters import JOINT, planes
 _STEPS, _NOISES = 60, 3
 #: Evidence above which a cause is believed.
 BELIEVED = 25.0
+#: Odds that a cause acts before anything was measured.
+ODDS = 0.1
 #: Time constants of the warmth that is asked for [s], and the exponent of the speed in the heat of friction.
 _CONSTANTS, _FRICTION = (450.0, 900.0, 1800.0), 1.25
 #: Spreads: of a natural frequency from the first to the last cut and over the speeds, of a cut's scale, of the force in an order of the
@@ -133,7 +135,10 @@ def causes(solution: Solution, misfit: Misfit, wider: float = 1.0) -> Causes:
     gradient, information, across = _bordered(linear, residual, inverse, together)
     moved = across @ np.linalg.solve(information, gradient)
     covariance = wider**2 * (inverse + across @ np.linalg.solve(information, across.T) + np.outer(moved, moved))
-    odds = np.exp(0.5 * np.clip([0.0, *(each.evidence for each in found)], -100.0, 100.0))
+    rare = 2.0 * np.log(ODDS)
+    # where sensors look that nobody has measured is as likely beside the flange as at it
+    priors = [0.0 if each.cause is Cause.DISTANCE and not misfit.data.distance_told else rare for each in found]
+    odds = np.exp(0.5 * np.clip([0.0, *(each.evidence + prior for each, prior in zip(found, priors, strict=True))], -100.0, 100.0))
     return Causes(tuple(found), covariance, float(odds[0] / odds.sum()))
 
 

@@ -125,8 +125,10 @@ class EvidenceSelection:
                 found = self._agreed(data, found, sequence, map, trace, progress)
             if data.sweeps:
                 found = self._asked(data, found, map, _report_to(BOTH, trace, progress))
-            assert isinstance(found, PlaneFit | CoupledFit)
-            return replace(replace(found, whole=whole).answer(seed, self.name), trace=tuple(trace))
+            if whole is not data:
+                assert isinstance(found, PlaneFit | CoupledFit)
+                found = replace(found, whole=whole)
+            return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
 
