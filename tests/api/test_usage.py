@@ -170,7 +170,7 @@ def test_small_requests_that_store_much_are_counted(tmp_path):
         machine = http.post("/v1/machines", json={"name": "M"}).json()["id"]
         statuses, body = [], declared(toolings={f"T{k}": "T0" for k in range(15)})
         body["cuts"][0]["tooling"] = "T0"
-        assert len(json.dumps(body)) < 1000
+        assert len(json.dumps(body)) < 1100
         for _ in range(16):
             statuses.append(http.post(f"/v1/machines/{machine}/campaigns", json=body).status_code)
         assert statuses == [201] * 5 + [413] * 11
