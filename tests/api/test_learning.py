@@ -125,7 +125,9 @@ def test_taps_teach_as_cuts_do(client, known, tmp_path):
     found = client.learn(campaign)
     row = number(found, "rotational stiffness of the contact")
     assert found.status == "converged"
-    assert abs(row.found - row.drawn / further_cuts.SOFTER) < 0.6 * abs(row.drawn - row.drawn / further_cuts.SOFTER)
+    # how far a tap teaches hangs on how well the machine is known, and that on the valley of a search as small as this one
+    assert abs(row.found - row.drawn / further_cuts.SOFTER) < 0.8 * abs(row.drawn - row.drawn / further_cuts.SOFTER)
+    assert row.found_std / row.found < row.drawn_std / row.drawn
     done = client.take_over(campaign, machine=True, seen=found.etag)
     assert (done.written, done.machine_written) == (["T7"], True)
     assert client.machine(machine).identification.taught_by == [f"new tool tapped ({campaign})"]
