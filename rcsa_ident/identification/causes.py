@@ -224,7 +224,7 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
     loud = _loudness(solution, misfit)
     found[Cause.AMPLITUDE] = [[_AMPLITUDE * (stiffness[i].sum(axis=1) * loud[cut[i]])[:, None] for i in axes]]
     if not np.any(np.isnan(data.made.temperature)):
-        found[Cause.TEMPERATURE] = [drift(_spread_out(data, data.made.temperature))]
+        found[Cause.TEMPERATURE] = [drift(_spread_out(data.made.temperature))]
     places = [misfit.distance_place(i, layout) for i in axes]
     if None not in places:
         steps = [_DISTANCE / LEVER * linear.jacobians[i][[behind[i] + JOINT + (places[i] or 0)]].T for i in axes]
@@ -254,7 +254,7 @@ def _courses(data: IdentificationData) -> list[FloatArray]:
     order = np.argsort(data.made.started, kind="stable")
     started, speed = data.made.started[order], data.spindle_speed[: data.cuts][order]
     heat = (speed / max(float(speed.max(initial=0.0)), 1e-300)) ** _FRICTION
-    found = [_spread_out(data, data.made.started)]
+    found = [_spread_out(data.made.started)]
     for constant in _CONSTANTS:
         warmth, now = np.zeros(heat.size), 0.0
         for k, pause in enumerate(np.diff(started, append=started[-1:] + USUAL_PAUSE)):
@@ -264,16 +264,16 @@ def _courses(data: IdentificationData) -> list[FloatArray]:
             now = warmth[k] * kept + heat[k] * (1.0 - kept)
         course = np.empty(heat.size)
         course[order] = warmth
-        found.append(_spread_out(data, course))
+        found.append(_spread_out(course))
     return found
 
 
-def _spread_out(data: IdentificationData, course: FloatArray) -> FloatArray:
-    """The course over all cuts, tests behind them at its end, from -1 to 1."""
+def _spread_out(course: FloatArray) -> FloatArray:
+    """The course over all cuts, from -1 to 1."""
     low, high = float(course.min(initial=np.inf)), float(course.max(initial=-np.inf))
     if not high > low:
-        return np.zeros(len(data.cut_ids))
-    return np.pad(2.0 * (course - low) / (high - low) - 1.0, (0, len(data.tests)))
+        return np.zeros(course.size)
+    return 2.0 * (course - low) / (high - low) - 1.0
 
 
 def _side_by_side(own: Sequence[FloatArray]) -> list[FloatArray]:
