@@ -2,8 +2,9 @@
 
 A fenced ``text`` block below a ``sh`` or ``python`` block is its output. Lines of a page that are ``…`` stand for any number of lines, a
 ``…`` within a line for any characters. Words have to be equal, and numbers to one of their last digit; or within N % where
-``<!-- within N % -->`` stands above, as of an identification, whose last digits are the processor's. Times, and how many modes a search
-has kept, are not compared. ``--write`` puts what was printed into the pages, and makes their figures anew.
+``<!-- within N %, columns A, B free -->`` stands above, as of an identification, whose valley the last bits of a processor decide: there,
+neither what follows ± nor the columns named are compared. Times, and how many modes a search has kept, never are. ``--write`` puts what
+was printed into the pages, and makes their figures anew.
 
 Commands of all pages run in one folder that holds the project's data, each once.
 """
@@ -45,16 +46,26 @@ FIGURES = {
 _NUMBER = re.compile(r"(?<![\w.-])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w-])")
 #: Seconds, numbers of modes.
 _FREE = re.compile(r"\b\d+(?:\.\d+)? s\b|\b\d+ modes?\b")
+_GUARD = re.compile(r"<!-- within (\d+) %(?:, columns? ([\d, ]+) free)? -->")
 
 
 @dataclass
 class Block:
-    """A fenced block: its language, its text, the line below its fence, and by how much its numbers may differ."""
+    """A fenced block: its language, its text, the line below its fence, by how much its numbers may differ, and its free columns."""
 
     kind: str
     text: str
     line: int
     within: float = 0.0
+    free: tuple[int, ...] = ()
+
+    def asked(self, line: str) -> str:
+        """Return what is compared of a line."""
+        line = _FREE.sub("%", line)
+        if self.within > 0.0:
+            cells = re.sub(r"± ?[\d.e+-]*\d", "±", line).split("│")
+            line = "│".join("" if k in self.free else cell for k, cell in enumerate(cells))
+        return line
 
 
 @dataclass
@@ -107,16 +118,16 @@ def _run(command: Sequence[str], folder: Path, environment: dict[str, str]) -> s
 
 def blocks(page: str) -> Iterator[Block]:
     """Yield the fenced blocks of a page."""
-    kind, lines, begin, within = None, list[str](), 0, 0.0
+    kind, lines, begin, guard = None, list[str](), 0, tuple[float, tuple[int, ...]]((0.0, ()))
     for number, line in enumerate(page.splitlines(), start=1):
         if kind is not None:
             if line == "```":
-                yield Block(kind, "\n".join(lines), begin, within)
-                kind, lines, within = None, [], 0.0
+                yield Block(kind, "\n".join(lines), begin, *guard)
+                kind, lines, guard = None, [], (0.0, ())
             else:
                 lines.append(line)
-        elif told := re.fullmatch(r"<!-- within (\d+) % -->", line):
-            within = float(told[1]) / 100.0
+        elif told := _GUARD.fullmatch(line):
+            guard = float(told[1]) / 100.0, tuple(int(each) for each in (told[2] or "").split(",") if each)
         elif re.fullmatch(r"```[a-z]+", line):
             kind, begin = line[3:], number + 1
 
@@ -142,12 +153,12 @@ def follow(name: str, run: Run) -> Iterator[tuple[Block, str]]:
 
 def words(line: str) -> str:
     """Return a line without its numbers, and without what only aligns them."""
-    return re.sub(r"[━─ ]+", " ", _NUMBER.sub("#", _FREE.sub("%", line))).strip()
+    return re.sub(r"[━─ ]+", " ", _NUMBER.sub("#", line)).strip()
 
 
 def close(told: str, printed: str, within: float) -> bool:
     """Whether the numbers of two lines agree, to the digits that are told."""
-    pairs = zip(*(_NUMBER.findall(_FREE.sub("%", line)) for line in (told, printed)), strict=True)
+    pairs = zip(*(_NUMBER.findall(line) for line in (told, printed)), strict=True)
     return all(abs(float(a) - float(b)) <= within * abs(float(a)) + 1.001 * 10.0 ** -len(a.partition(".")[2]) for a, b in pairs)
 
 
@@ -165,29 +176,31 @@ def compared(block: Block, printed: str) -> Iterator[tuple[int, str, str | None]
         if told == "…":
             skipping = True
             continue
-        there = [k for k in range(place, len(lines) if skipping else place + 1) if k < len(lines) and fitting(told, lines[k])]
+        asked, given = block.asked(told), [block.asked(line) for line in lines]
+        there = [k for k in range(place, len(lines) if skipping else place + 1) if k < len(lines) and fitting(asked, given[k])]
         if not there:
             yield number, told, None
             continue
-        chosen = next((k for k in there if "…" in told or close(told, lines[k], block.within)), there[0])
+        chosen = next((k for k in there if "…" in told or close(asked, given[k], block.within)), there[0])
         yield number, told, lines[chosen]
         place, skipping = chosen + 1, False
 
 
-def agrees(told: str, found: str | None, within: float) -> bool:
+def agrees(block: Block, told: str, found: str | None) -> bool:
     """Whether a line was printed as the page tells it; where it leaves characters out, numbers beside them have to be equal."""
     if found is None:
         return False
+    told, found = block.asked(told), block.asked(found)
     if "…" in told:
-        return re.fullmatch(".*".join(re.escape(part) for part in _FREE.sub("%", told).split("…")), _FREE.sub("%", found)) is not None
-    return close(told, found, within)
+        return re.fullmatch(".*".join(re.escape(part) for part in told.split("…")), found) is not None
+    return close(told, found, block.within)
 
 
 def differences(name: str, run: Run) -> Iterator[Difference]:
     """Yield what a page says and its commands do not."""
     for block, printed in follow(name, run):
         for number, told, found in compared(block, printed):
-            if not agrees(told, found, block.within):
+            if not agrees(block, told, found):
                 yield Difference(name, block.line + number, told, found)
 
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from benchmarks.page_outputs import FIGURES, NOT_RUN, PAGES, Block, Run, blocks, compared, differences
+from benchmarks.page_outputs import FIGURES, NOT_RUN, PAGES, Block, Run, agrees, blocks, compared, differences
 from tests.fixtures.paths import ROOT
 
 
@@ -48,14 +48,18 @@ def test_every_block_of_the_readme_is_run():
     ],
 )
 def test_lines_are_compared(told, printed, agree):
-    from benchmarks.page_outputs import agrees
-
-    assert all(agrees(line, found, 0.0) for _, line, found in compared(Block("text", told, 1), printed)) is agree
+    block = Block("text", told, 1)
+    assert all(agrees(block, line, found) for _, line, found in compared(block, printed)) is agree
 
 
 def test_a_page_says_how_near_its_numbers_are():
-    one, other = blocks("<!-- within 2 % -->\n```text\n100\n```\n```text\n100\n```\n")
-    assert (one.within, other.within) == (0.02, 0.0)
+    one, two, other = blocks(
+        "<!-- within 2 %, columns 1, 3 free -->\n```text\n│ 2.3 │ 100 │ 0.1 │\n```\n"
+        "<!-- within 2 % -->\n```text\n100 ± 3\n```\n```text\n100 ± 3\n```\n"
+    )
+    assert [agrees(one, one.text, f"│ 1.1 │ {depth} │ 0.4 │") for depth in (101, 104)] == [True, False]
+    assert [agrees(two, two.text, f"{depth} ± 5") for depth in (101, 104)] == [True, False]
+    assert [agrees(other, other.text, line) for line in ("100 ± 3", "100 ± 5", "102 ± 3")] == [True, False, False]
 
 
 #: What README and the tutorial say of accuracy, and how the page puts it that has the command beside it.
