@@ -1,14 +1,18 @@
-"""What all tests share."""
+"""What all tests share: rings, order, kernels, chance."""
 
 from __future__ import annotations
 
+import json
 import os
-import subprocess
-import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadScopeScheduling
+
+from tests.fixtures.kept_kernels import PACKAGE, keep, ready
+from tests.fixtures.reach import changed_since, reached
 
 # chance has a seed: what is drawn is the same at every run, until a test changes
 settings.register_profile("seeded", derandomize=True)
@@ -20,48 +24,90 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 #: Fixtures behind which a browser, a service, a database or a cluster runs: whoever asks for one is slow.
 _PROCESSES = {"browser", "served", "postgres_server"}
-_KERNELS = Path(__file__).resolve().parents[1] / "rcsa_ident"
-#: Half of what there is to compile each.
-_HALVES = ("[name for name in STEPS if name == 'lobes in time']", "[name for name in STEPS if name != 'lobes in time']")
+#: Seconds of each function by its file, as the last whole run has found them.
+_DURATIONS = Path(__file__).with_name("durations.json")
+_seconds: Counter[str] = Counter()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    rings = parser.getgroup("rings")
+    told = "gate: quick tests and witnesses (default); rest: the slow ones beside them; whole: all (default where tests are named)"
+    rings.addoption("--ring", choices=["gate", "rest", "whole"], help=told)
+    rings.addoption("--since", metavar="COMMIT", help="of the rest, what a change since this commit can reach")
+    rings.addoption(
+        "--keep-durations", action="store_true", help=f"write what tests took into {_DURATIONS.name}, by which the next run is ordered"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Settle the ring before workers are told of it."""
+    if config.option.ring is None:
+        named = config.args_source is pytest.Config.ArgsSource.ARGS or config.option.markexpr or config.option.keyword
+        config.option.ring = "rest" if config.option.since else "whole" if named else "gate"
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile kernels once before several workers need them, who would all compile the same ones."""
-    if (session.config.getoption("numprocesses", None) or 0) < 2 or session.config.option.collectonly or _compiled():
-        return
-    code = "from rcsa_ident.workflows.compile_kernels import STEPS\nfor name in {}: STEPS[name]()"
-    halves = [subprocess.Popen([sys.executable, "-c", code.format(half)], cwd=_KERNELS.parent) for half in _HALVES]
-    assert [half.wait() for half in halves] == [0, 0]
+    if _several(session.config):
+        ready()
 
 
-def _compiled() -> bool:
-    """Whether every kernel module has a cache that is younger than itself; one for another processor is none."""
-    if os.environ.get("NUMBA_CPU_NAME"):
-        return False
-    for module in _KERNELS.rglob("_*kernels.py"):
-        caches = list((module.parent / "__pycache__").glob(f"{module.stem}.*.nbi"))
-        if not caches or max(cache.stat().st_mtime for cache in caches) < module.stat().st_mtime:
-            return False
-    return True
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if _several(session.config):
+        keep(PACKAGE)
+    if session.config.option.keep_durations and not hasattr(session.config, "workerinput"):
+        found: dict[str, dict[str, float]] = {}
+        for name, seconds in sorted(_seconds.items()):
+            if seconds > 0.5:
+                file, _, function = name.partition("::")
+                found.setdefault(file, {})[function] = round(seconds, 1)
+        _DURATIONS.write_text(json.dumps(found, indent=1) + "\n")
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    _seconds[report.nodeid.partition("[")[0]] += report.duration
+
+
+def _several(config: pytest.Config) -> bool:
+    """Whether this process leads several workers."""
+    return (config.getoption("numprocesses", None) or 0) > 1 and not config.option.collectonly
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what is slow by its fixtures; workers begin with the files that take longest, so that none of them is the tail."""
+    """Mark what is slow by its fixtures, leave the ring, and let workers begin with what takes longest, so that it is not the tail."""
     for item in items:
         if _PROCESSES & set(getattr(item, "fixturenames", ())) and item.get_closest_marker("slow") is None:
             item.add_marker("slow")
+    ring, since = config.option.ring, config.option.since
+    if ring != "whole":
+        gate = {item for item in items if item.get_closest_marker("slow") is None or item.get_closest_marker("witness") is not None}
+        changed = changed_since(since) if since else []
+        paths = {path for path in {item.path for item in items} if not since or reached(changed, path)} if ring == "rest" else set()
+        kept = [item for item in items if (item in gate if ring == "gate" else item not in gate and item.path in paths)]
+        config.hook.pytest_deselected(items=[item for item in items if item not in set(kept)])
+        items[:] = kept
     if hasattr(config, "workerinput"):
-        seconds: dict[Path, float] = {}
-        for item in items:
-            seconds[item.path] = seconds.get(item.path, 0.0) + _seconds(item)
-        items.sort(key=lambda item: -seconds[item.path])
+        lasted = json.loads(_DURATIONS.read_text()) if _DURATIONS.is_file() else {}
+        weight: Counter[str] = Counter()
+        for name in {item.nodeid.partition("[")[0] for item in items}:
+            file, _, function = name.partition("::")
+            weight[_room(name)] += lasted.get(file, {}).get(function, 0.01)
+        items.sort(key=lambda item: -weight[_room(item.nodeid)])
 
 
-def _seconds(item: pytest.Item) -> float:
-    """About what a test takes, as its marker says."""
-    slow = item.get_closest_marker("slow")
-    return 0.0 if slow is None else float(slow.args[0]) if slow.args else 2.0
+def _room(name: str) -> str:
+    """What stays with one worker: a file, whose fixtures are paid once, or all files of the page, which share service and browser."""
+    return "tests/web" if name.startswith("tests/web/") else name.partition("::")[0]
+
+
+class _Rooms(LoadScopeScheduling):
+    def _split_scope(self, nodeid: str) -> str:
+        return _room(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadScopeScheduling:
+    return _Rooms(config, log)
 
 
 @pytest.hookimpl(wrapper=True)

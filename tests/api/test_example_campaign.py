@@ -20,7 +20,7 @@ def complete(client: Client, campaign: str) -> bool:
     return all(cut.verdict is not None and cut.air is not None and cut.air.uploaded for cut in found.cuts)
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_an_example_is_made_and_goes_as_a_whole(http, client):
     made = client.make_example()
     machine = client.machine(made.machine)
@@ -47,7 +47,7 @@ def test_an_example_is_made_and_goes_as_a_whole(http, client):
     assert client.make_example() == made
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 def test_what_is_missing_is_made_when_it_is_asked_again(client):
     made = client.make_example()
     until(lambda: complete(client, made.campaign))

@@ -33,7 +33,7 @@ from tests.fixtures.service import command, example, serving
 from tests.fixtures.waiting import PATIENCE, until
 
 pytestmark = [
-    pytest.mark.slow(20),
+    pytest.mark.slow,
     pytest.mark.skipif(os.name != "posix" or not Path("/proc/self/stat").exists(), reason="processes are looked up in /proc"),
 ]
 

@@ -9,7 +9,7 @@ from tests.api.identifying import uploaded
 from tests.fixtures.service import example, serving
 from tests.fixtures.waiting import until
 
-pytestmark = pytest.mark.slow(25)
+pytestmark = pytest.mark.slow
 
 
 def test_lobes_do_not_wait_for_an_identification(tmp_path, result):

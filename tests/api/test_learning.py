@@ -42,7 +42,7 @@ def number(found, what=STIFFNESS):
     return next(row for row in tooling.learned if row.what == what)
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_new_cuts_are_looked_at_and_taken_over(client, known):
     """The contact is drawn at 0.7 of what it is; two cuts tell, and what is written is what was seen."""
     machine, campaign = made(client, known)
@@ -81,7 +81,7 @@ def test_new_cuts_are_looked_at_and_taken_over(client, known):
     assert refused(412, client.take_over, campaign, seen=found.etag).status == 412
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_what_others_have_written_is_not_overwritten(client, known):
     machine, campaign = made(client, known)
     found = client.learn(campaign)
@@ -99,7 +99,7 @@ def test_what_others_have_written_is_not_overwritten(client, known):
     refused(412, client.take_over, campaign, seen=found.etag)
 
 
-@pytest.mark.slow(5)
+@pytest.mark.slow
 def test_cuts_that_contradict_are_named_and_nothing_is_written(client, result):
     """They are another machine's."""
     machine, campaign = made(client, result)
@@ -113,7 +113,7 @@ def test_cuts_that_contradict_are_named_and_nothing_is_written(client, result):
     assert len(list(client.changes(kind="tooling", name="T7"))) == 1
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_taps_teach_as_cuts_do(client, known, tmp_path):
     """A campaign of hammer tests of the tip alone; the drawn contact is 0.7 of what it is."""
     machine = client.make_machine("HPM").id
@@ -142,7 +142,7 @@ def test_taps_teach_as_cuts_do(client, known, tmp_path):
     assert refused(422, client.learn, other).errors[0].field == "frfs.force"
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_toolings_and_machine_are_taken_over_together_or_not_at_all(client, known, monkeypatch):
     """Another has written the machine between what was read of it and what is written."""
     machine, campaign = made(client, known)
@@ -160,7 +160,7 @@ def test_toolings_and_machine_are_taken_over_together_or_not_at_all(client, know
     assert client.machine(machine).identification.taught_by == []
 
 
-@pytest.mark.slow(5)
+@pytest.mark.slow
 def test_refusals_are_the_commands(client, result, tmp_path):
     machine, campaign = made(client, result)
     exact = {key: value for key, value in further_cuts.drawn().items() if key != "spread"}
@@ -176,7 +176,7 @@ def test_refusals_are_the_commands(client, result, tmp_path):
     refused(404, client.learn, "nothing")
 
 
-@pytest.mark.slow(5)
+@pytest.mark.slow
 def test_keys_and_groups(guarded_http, result):
     http, keys = guarded_http
     _, campaign = made(Client(key=keys["admin"], http=http), result)

@@ -78,7 +78,7 @@ TABLES = ("POST /v1/tested-cuts/preview", "POST /v1/robots/path/preview", "POST 
 ARMS, RECORDINGS = ("PUT /v1/robots/{name}",), ("POST /v1/listen", "POST /v1/tap", "POST /v1/ring")
 
 
-@pytest.mark.slow(45)
+@pytest.mark.slow
 def test_the_api_keeps_to_its_description(tmp_path, result):
     """Whatever is sent: no 5xx, no undocumented status, type or body. With a fixed seed, and so many cases for each operation."""
     for operation, statuses in answers(tmp_path, result, 20261121, 20):

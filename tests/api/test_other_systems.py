@@ -29,7 +29,7 @@ def test_fixtures_are_imported_where_no_module_knows_users():
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=PATIENCE)
 
 
-@pytest.mark.slow(40)
+@pytest.mark.slow
 def test_a_campaign_comes_to_its_lobes(tmp_path, elsewhere):
     data = tmp_path / "data"
     with serving(data, RCSA_IDENT_JOB_WORKERS="1", **elsewhere) as served, Client(served.url) as client:

@@ -429,7 +429,7 @@ assert not late, late
 """
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow
 def test_no_kernel_is_compiled_within_the_limits_of_a_call():
     """A compiler needs more memory than a call has: on a new installation no record that wanders could be read."""
     subprocess.run([sys.executable, "-c", KNOWN_KERNELS], check=True, timeout=PATIENCE)

@@ -150,7 +150,7 @@ def test_too_many_at_once_and_too_much(store, tmp_path, rung):
     assert files_in(tmp_path) == []
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_the_cut_off_reader_hears_it_and_refuses_the_hostile(rung, tmp_path):
     """The reader process sees the sounds alone, within its limits."""
     folder, grams = rung

@@ -255,7 +255,7 @@ def test_a_service_without_keys_says_so_and_cuts_off_a_body_without_an_end(tmp_p
     assert any("no keys are asked for" in json.loads(line)["event"] for line in served.log.read_text().splitlines())
 
 
-@pytest.mark.slow(30)
+@pytest.mark.slow
 def test_a_long_question_ends_with_its_client_and_with_the_service(tmp_path, result):
     """Both would compute for minutes."""
     with (

@@ -19,7 +19,7 @@ CYLINDERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 @pytest.mark.parametrize(("compared", "wanted"), list(zip(cylinder_error.COMPARED, CYLINDERS, strict=True)))
 def test_cylinders_are_as_far_off_as_was_found(compared, wanted):
     true, cylinder = cylinder_error.limits(compared)

@@ -26,7 +26,7 @@ def test_what_is_known_of_the_cuts():
 
 
 @needs_cuts
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow
 def test_forty_labels_teach():
     """Of few draws of the prior: cuts of speeds that were never learnt are told better than before."""
     cuts, training, model = read(CUTS), read(TRAINING), LabelModel()

@@ -69,7 +69,7 @@ def test_what_is_told_as_equivalent_stands_in_its_module():
             assert each["why"]
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_a_mutant_that_tests_notice_is_killed(capsys, monkeypatch):
     killed, survivors, same, _ = mutation.score("rcsa_ident/units.py", ["tests/io/test_spindle_drives.py"], 5, 1)
     assert killed + survivors + same == 5

@@ -73,7 +73,7 @@ def test_one_tap_serves_every_tool(shop):
     np.testing.assert_allclose(found.values["X"], before.values["X"], rtol=1e-9)
 
 
-@pytest.mark.slow(seconds=25)
+@pytest.mark.slow
 def test_limits_take_it(shop):
     """A cutter that pushes along its axis; without the tap a sentence says that Z is taken as rigid."""
     run("axial", shop / "RESULT.json", shop / "T1.toml", shop / "Z.csv", "--out", shop / "TAPPED.json")

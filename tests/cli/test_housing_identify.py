@@ -52,7 +52,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow(seconds=25)
+@pytest.mark.slow
 def test_accelerometers_alone_say_how_far_they_can_be_trusted(folder, tmp_path):
     found = run("identify", folder, "--out", tmp_path / "R.json", "--report", tmp_path / "R.html")
     assert found.exit_code == 3, found.output
@@ -87,7 +87,7 @@ def beside(tmp_path_factory):
     return simulate_campaign(replace(machine, spindle=spindle, plan=plan), tmp_path_factory.mktemp("beside") / "campaign", seed=5).folder
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow
 def test_a_pair_on_the_housing_is_read_beside_displacement_sensors(beside):
     told = json.loads(run("check", beside, "--json").stdout)
     assert told["usable"] == told["cuts"] == 4

@@ -37,7 +37,7 @@ def name(one_cut):
     return re.search(rf'^"?{key}"? = "toolings/(.+)"$', text, flags=re.MULTILINE).group(1)
 
 
-@pytest.mark.slow(5)
+@pytest.mark.slow
 def test_a_cut_of_another_machine_contradicts_and_nothing_is_written(result_file, one_cut, tmp_path):
     found = run(
         "learn", result_file, one_cut, "--toolings", tmp_path / "out", "--machine", tmp_path / "NEW.json", "--json", "--processes", 1
@@ -85,7 +85,7 @@ def with_taps(known, *arguments, file="tip.csv"):
     return run("learn", known / "RESULT.json", known / "T7.toml", *taps, *arguments)
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_a_tap_teaches_a_tooling_and_the_machine_once(known, tmp_path):
     out, new = tmp_path / "out", tmp_path / "NEW.json"
     found = with_taps(known, "--toolings", out, "--machine", new, "--json")
@@ -110,7 +110,7 @@ def test_a_tap_teaches_a_tooling_and_the_machine_once(known, tmp_path):
     assert "renamed.csv, which taught this machine already" in second.stderr.replace("\n", " ")
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_a_tap_of_another_tool_is_told_and_nothing_is_written(known, tmp_path):
     found = with_taps(known, "--toolings", tmp_path / "out", "--machine", tmp_path / "NEW.json", "--json", file="other.csv")
     assert found.exit_code == 3, found.output
@@ -120,7 +120,7 @@ def test_a_tap_of_another_tool_is_told_and_nothing_is_written(known, tmp_path):
     assert not (tmp_path / "NEW.json").exists()
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_a_campaign_may_hold_taps_alone(known, tmp_path):
     folder = tmp_path / "tapped"
     folder.mkdir()

@@ -57,7 +57,7 @@ def keys_of(text: str) -> set[str]:
     return {word for told in re.findall(r"`([^`]+)`", text) for word in re.findall(r"[a-z]\w*", told)}
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_keys_are_told(name, tmp_path, monkeypatch):
     monkeypatch.chdir(EXAMPLES)

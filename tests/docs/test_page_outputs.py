@@ -10,7 +10,7 @@ from benchmarks.page_outputs import FIGURES, NOT_RUN, PAGES, Block, Run, agrees,
 from tests.fixtures.paths import ROOT
 
 
-@pytest.mark.slow(90)
+@pytest.mark.slow
 def test_pages_show_what_is_printed(tmp_path):
     """Each in its order, in one folder; a script without a guard gives the command's result, byte for byte."""
     run = Run(tmp_path)

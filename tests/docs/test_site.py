@@ -84,7 +84,7 @@ def words(page: str) -> str:
     return html.unescape(re.sub(r"<[^>]+>", "", page))
 
 
-@pytest.mark.slow(45)
+@pytest.mark.slow
 def test_no_link_is_dead(pages):
     assert len(pages) > 150
     within = [(page, link) for page, content in pages.items() for link in content.links if not urlsplit(link).scheme]
@@ -124,7 +124,7 @@ def test_the_references_are_made_of_what_they_describe(site):
     assert json.loads(schema.read_text(encoding="utf-8"))["title"]
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium: apt-get install chromium")
 def test_every_equation_is_set(pages):
     """In a browser: what MathJax does not understand stands in red on the page."""

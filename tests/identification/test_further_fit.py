@@ -69,7 +69,7 @@ def error(machine, assembly, shop, clamped):
     return max(np.linalg.norm(tip.between(f"tip.{a}", f"tip.{a}") - true[:, i]) / np.linalg.norm(true[:, i]) for i, a in enumerate(AXES))
 
 
-@pytest.mark.slow(40)
+@pytest.mark.slow
 def test_one_cut_of_a_new_tool_teaches_its_tip(shop, machine, clamped):
     data = of_one_cut(shop, clamped)
     fit = fit_further(data, KnownMachine(machine.posteriors(), machine.toolings), 0.0)
@@ -144,7 +144,7 @@ def test_slopes_of_a_tap_are_those_of_its_residuals(shop, few):
                 np.testing.assert_allclose(found[rows], expected[rows], rtol=0.0, atol=1e-6 * size + 1e-9)
 
 
-@pytest.mark.slow(40)
+@pytest.mark.slow
 def test_one_tap_of_a_new_tool_teaches_its_tip(shop, machine, clamped):
     known = KnownMachine(machine.posteriors(), machine.toolings)
     fit = fit_further(of_one_tap(shop, clamped), known, 0.0)
@@ -167,7 +167,7 @@ def test_one_tap_of_a_new_tool_teaches_its_tip(shop, machine, clamped):
     assert np.mean(inside) > 0.8
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_a_tap_of_another_tool_is_told(shop, machine):
     other = next(iter(shop.toolings.values()))
     fit = fit_further(of_one_tap(shop, other), KnownMachine(machine.posteriors(), machine.toolings), 0.0)

@@ -133,7 +133,7 @@ def test_places_that_are_measured_beside_each_other(data):
     assert (costs[0] - costs[1]) / 4.0 == pytest.approx(here.linear.gradient @ step, rel=1e-4)
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow
 def test_a_tooling_that_never_cut_follows_from_three_that_did(shop, data):
     found = SMALL.run(data, 1)
     # on other machines such an answer is wrong by more, and nothing in its lines shows it
@@ -262,7 +262,7 @@ def test_what_cannot_be_told_is_refused_by_name(shop, data):
     assert caught.value.field == "frfs"
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow
 def test_planes_that_feel_each_other_are_fitted_without_accelerometers_on_the_housing():
     """Evidences of different lines cannot be compared: the flange's decide, and that the others were not used is said."""
     shop = open_shop(6, lambda spindle: oblique(spindle, 15.0, 0.6))

@@ -88,7 +88,7 @@ def tip_errors(shop, truly, machine, told):
     return np.array(errors), float(np.mean(inside))
 
 
-@pytest.mark.slow(60)
+@pytest.mark.slow
 def test_cuts_tell_what_the_drawings_do_not(roughly_drawn):
     shop, truly, told, found, _ = roughly_drawn
     errors, inside = tip_errors(shop, truly, found.machine, told)
@@ -104,7 +104,7 @@ def test_cuts_tell_what_the_drawings_do_not(roughly_drawn):
     assert np.min(known.deviation) < 0.7
 
 
-@pytest.mark.slow(1)
+@pytest.mark.slow
 def test_who_takes_the_drawings_for_exact_is_far_off_and_says_so(roughly_drawn):
     shop, truly, told, found, drawn = roughly_drawn
     exact = {name: replace(each, spread=EXACT) for name, each in told.items()}
@@ -114,7 +114,7 @@ def test_who_takes_the_drawings_for_exact_is_far_off_and_says_so(roughly_drawn):
     assert drawn.status is Status.SUSPECT
 
 
-@pytest.mark.slow(1)
+@pytest.mark.slow
 def test_the_answer_goes_through_its_file(roughly_drawn):
     shop, _, told, found, _ = roughly_drawn
     campaign = Campaign("", 25600.0, (), shop.machine.workpiece, told, ())

@@ -18,7 +18,7 @@ from rcsa_ident.signals.recording import LONGEST, Quantity, Recording, Sensor
 from rcsa_ident.signals.steady import steady_record
 from tests.fixtures.recording_formats import FORMATS
 
-pytestmark = pytest.mark.slow(20)
+pytestmark = pytest.mark.slow
 RATE, SPEED = 20000.0, 2.0 * np.pi * 133.37
 SENSORS = (
     Sensor("flange_x", Quantity.DISPLACEMENT, Dof.X, 1.0e4),

@@ -62,26 +62,26 @@ def ratio(name, process, speeds, counted):
     return counted["work"] / float(method.operations(process, speeds, TOP, 0.01).sum())
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", CUTS)
 @pytest.mark.parametrize("name", ["full-discretisation", "semi-discretisation"])
 def test_period_maps(counted, name, cut):
     assert 0.4 < ratio(name, CUTS[cut], SPEEDS[1:], counted) < 2.5
 
 
-@pytest.mark.slow(5)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["full-discretisation", "multi-frequency"])
 def test_slow_spindles_cost_what_is_said(counted, name):
     assert 0.4 < ratio(name, CUTS["half"], SPEEDS[:1], counted) < 2.5
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", ["half", "low immersion", "two teeth, low immersion", "slot", "ten teeth"])
 def test_multi_frequency(counted, cut):
     assert 0.4 < ratio("multi-frequency", CUTS[cut], SPEEDS[1:], counted) < 2.5
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", ["half", "unequal pitch"])
 def test_time_domain(counted, cut):
     assert 0.4 < ratio("time-domain", CUTS[cut], SPEEDS[2:], counted) < 2.5

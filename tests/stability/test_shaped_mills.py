@@ -41,14 +41,14 @@ def test_full_discretisation(name):
     assert not [words for words in lobes.warnings if "converged" in words]
 
 
-@pytest.mark.slow(40)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in mills.LIMITS if name not in ("E A", "E B")])
 def test_multi_frequency(name):
     process, tip, rpm, wanted = mills.LIMITS[name]
     assert limits(process, tip, rpm, MultiFrequency())[0] == pytest.approx(wanted, rel=4e-4)
 
 
-@pytest.mark.slow(40)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "place"), [("E A", 3), ("E B", 0), ("E B", 3)])
 def test_multi_frequency_with_a_helix_of_each_tooth(name, place):
     """At some of the speeds: a turn of the slow one holds a hundred harmonics, and costs seconds."""
@@ -64,7 +64,7 @@ def test_multipliers(place):
     assert abs(found.value) == pytest.approx(wanted, rel=2e-5)
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 @pytest.mark.parametrize("feed", mills.ROUGHER)
 def test_a_serrated_edge(feed):
     found, _ = limits(mills.rougher(1e-3 * feed), mills.tip(mills.M1[:2]), mills.ROUGHER_SPEEDS, FullDiscretisation(tolerance=1e-3))
@@ -72,7 +72,7 @@ def test_a_serrated_edge(feed):
     assert found == pytest.approx(mills.ROUGHER[feed], rel=6e-3)
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "place", "near"),
     [("A", 0, 3e-3), ("A, slope -7", 0, 3e-3), ("C", 0, 3e-3), ("D", 1, 3e-3), ("E A", 2, 7e-3), ("E B", 1, 8e-3)],
@@ -84,7 +84,7 @@ def test_time_domain_without_loss_of_contact(name, place, near):
     assert found == pytest.approx(wanted[place], rel=near)
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 def test_a_leaning_ball():
     """Its arcs are those of the depth of cut: the limit is where the cut of that depth neither grows nor dies away."""
     tip, leaning = mills.tip(mills.M1), Cutter(2, 0.010, helix=30 * mills.DEG, profile=Profile.ball(0.010))
@@ -195,7 +195,7 @@ def test_bands_of_a_face_mill_end_where_its_edge_does():
         assert np.all(np.ptp(found.drawn, axis=0) > 0.0)
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 def test_a_straight_serrated_edge():
     """Its waves do not open gradually: what full discretisation makes of it is what the march through time does."""
     straight = replace(mills.rougher(0.08e-3), cutter=Cutter(3, 0.016, serration=Serration(0.25e-3, 1.5e-3)))

@@ -100,7 +100,7 @@ def test_what_grows_beyond_all_numbers_is_chatter(rpm, leaves):
     assert cut.growth(0.1e-3, 150) < 0.0
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_rubbing_that_a_step_does_not_resolve_is_asked_of_finer_steps(monkeypatch):
     """The flank's force is that of the step before: where it would take most of the velocity, the steps alone had a limit."""
     asked = tip(PASSING), slow_slot(1e-4), np.array([1600.0]) * RPM, 20e-3

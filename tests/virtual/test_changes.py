@@ -104,7 +104,7 @@ def test_a_joint_gives_way_with_amplitude_and_differs_from_clamping_to_clamping(
         assert found.translational_damping == joint.translational_damping
 
 
-@pytest.mark.slow(30)
+@pytest.mark.slow
 def test_an_untouched_machine_gives_the_same_records_to_the_last_bit(small):
     plain = records(small)
     for changes in (Changes(), Changes(chip_law=ChipLaw(0.0))):
@@ -114,7 +114,7 @@ def test_an_untouched_machine_gives_the_same_records_to_the_last_bit(small):
             np.testing.assert_array_equal(again[name], values)
 
 
-@pytest.mark.slow(30)
+@pytest.mark.slow
 def test_each_change_shows_in_the_records_and_the_campaign_keeps_their_order(small):
     plain = records(small)
     warm = dataclasses.replace(SOFT, running=3000.0, shuffled=True)
@@ -129,7 +129,7 @@ def test_each_change_shows_in_the_records_and_the_campaign_keeps_their_order(sma
         assert [line.split('"')[1] for line in text.splitlines() if line.startswith("id = ")] == made
 
 
-@pytest.mark.slow(15)
+@pytest.mark.slow
 def test_two_toolings_are_clamped_on_two_joints(small, monkeypatch):
     seen = []
 

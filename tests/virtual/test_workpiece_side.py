@@ -120,7 +120,7 @@ def test_a_table_that_is_none_is_refused(machines_folder, tmp_path, more, words)
         read_machine(path)
 
 
-@pytest.mark.slow(5)
+@pytest.mark.slow
 def test_its_accelerometers_are_in_the_records(hpm, tmp_path, monkeypatch):
     """Named after what they stand on, with that role, and moved by -G_w F; what stands on the spindle does not know of the table."""
     monkeypatch.setattr("rcsa_ident.workflows.simulate.TRUTH_FREQUENCIES", (600.0, 900.0, 100.0))

@@ -46,15 +46,20 @@ def client(served: Served) -> Iterator[Client]:
         yield found
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for each file and no longer: its event loop runs in this thread, where other rooms' tests run loops of their own."""
+@pytest.fixture(scope="package")
+def launch() -> Iterator[Callable[..., Browser]]:
+    """Start browsers; for this room and no longer: the event loop runs in this thread, where other rooms' tests run loops of their own."""
     # reached only where something is wrong, and long enough for a machine under load
     expect.set_options(timeout=30_000)
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(QUIET))
-        yield found
-        found.close()
+        yield lambda *further: playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=[*QUIET, *further])
+
+
+@pytest.fixture(scope="package")
+def browser(launch: Callable[..., Browser]) -> Iterator[Browser]:
+    found = launch()
+    yield found
+    found.close()
 
 
 @dataclass
@@ -133,6 +138,11 @@ def shop(client: Client, result: str) -> str:
     client.write_tooling("T1", by_hand.TOOLING)
     client.write_tooling("T1-long", by_hand.TOOLING.replace("stickout_mm = 60.0", "stickout_mm = 75.0").replace("= 100.0", "= 115.0"))
     return id
+
+
+def hearing(sound: Path) -> tuple[str, ...]:
+    """Arguments of a browser whose microphone hears a file."""
+    return ("--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream", f"--use-file-for-fake-audio-capture={sound}")
 
 
 def fault_beside(page: Page, field_name: str) -> str:

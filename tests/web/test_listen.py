@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 from scipy.io import wavfile
 
 from rcsa_ident.io.frf_files import read_frfs
 from tests.api.test_listening import CHATTER, samples, text_of_hits
 from tests.fixtures.service import Served
 from tests.signals.test_tap import receptance
-from tests.web.conftest import CHROMIUM, QUIET, drop
-from tests.web.test_accessibility import looks, violations
+from tests.web.conftest import drop, hearing
+from tests.web.test_accessibility import faults
 
 RATE = 48000
 
@@ -27,16 +27,13 @@ def plain(text: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def browser(launch: Callable[..., Browser], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One whose microphone hears a cut that chatters."""
     path = tmp_path_factory.mktemp("microphone") / "heard.wav"
     wavfile.write(path, RATE, (30000.0 * 0.6 * samples(12.0, rate=RATE)).astype(np.int16))
-    heard = ("--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream", f"--use-file-for-fake-audio-capture={path}")
-    expect.set_options(timeout=30_000)
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=[*QUIET, *heard])
-        yield found
-        found.close()
+    found = launch(*hearing(path))
+    yield found
+    found.close()
 
 
 @pytest.fixture
@@ -194,9 +191,7 @@ def test_everybody_can_use_it(opened, served: Served, sound: Path, tmp_path: Pat
         drop(page, "h1", [file])
         page.locator(shown).wait_for(timeout=60_000)
         expect(page.locator("main .chart .main-svg").last).to_be_visible()
-        for look in looks(page):
-            if faults := violations(page):
-                found[f"{address}, {look}"] = faults
+        found |= {f"{address}, {look}": each for look, each in faults(page).items()}
     assert found == {}
 
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
 from api.client import Client
 from tests.fixtures.rung_tooling import rung_tooling
 from tests.fixtures.service import Served
-from tests.web.conftest import CHROMIUM, QUIET, drop, fault_beside
-from tests.web.test_accessibility import looks, violations
+from tests.web.conftest import drop, fault_beside, hearing
+from tests.web.test_accessibility import faults
 
 
 @pytest.fixture(scope="module")
@@ -24,15 +24,11 @@ def rung(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
 
 
 @pytest.fixture(scope="module")
-def browser(rung: tuple[Path, float]) -> Iterator[Browser]:
+def browser(launch: Callable[..., Browser], rung: tuple[Path, float]) -> Iterator[Browser]:
     """One whose microphone hears the tooling ring."""
-    played = f"--use-file-for-fake-audio-capture={rung[0] / 'whole.wav'}"
-    heard = ("--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream", played)
-    expect.set_options(timeout=30_000)
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=[*QUIET, *heard])
-        yield found
-        found.close()
+    found = launch(*hearing(rung[0] / "whole.wav"))
+    yield found
+    found.close()
 
 
 def drawn(client: Client, rung: tuple[Path, float], name: str) -> str:
@@ -92,7 +88,7 @@ def test_files_of_the_tooling_and_of_the_tool_alone_on_a_phone(opened, served: S
     page.get_by_label("Mass of the tool alone").fill(f"{grams:.2f}")
     page.get_by_role("button", name="Learn from these").click()
     learned(page, "fluted diameter")
-    found = {look: faults for look in looks(page) if (faults := violations(page))}
+    found = faults(page)
     assert found == {}
     # nothing sticks out on a phone, and nothing is written
     page.set_viewport_size({"width": 390, "height": 844})

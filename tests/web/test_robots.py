@@ -16,7 +16,7 @@ from tests.fixtures.robots import ROBOTS, robot
 from tests.fixtures.service import Served
 from tests.fixtures.waiting import until
 from tests.web.conftest import drop
-from tests.web.test_accessibility import looks, violations
+from tests.web.test_accessibility import faults
 
 pytest.importorskip("playwright")
 from playwright.sync_api import Page, Route, expect
@@ -236,7 +236,7 @@ def test_an_arm_without_masses_has_postures_and_no_lobes(opened, served: Served,
 
 
 def test_everybody_can_use_it_and_nothing_sticks_out_on_a_phone(page: Page):
-    found = {look: faults for look in looks(page) if (faults := violations(page))}
+    found = faults(page)
     assert found == {}
     page.set_viewport_size({"width": 390, "height": 844})
     assert page.evaluate("document.documentElement.scrollWidth") == 390

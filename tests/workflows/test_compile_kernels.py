@@ -56,7 +56,7 @@ def test_every_step_is_done_once():
     assert sorted(name for names in (FIRST, *TOGETHER) for name in names) == sorted(STEPS)
 
 
-@pytest.mark.slow(60)
+@pytest.mark.slow
 def test_what_is_done_at_once_compiles_no_file_of_kernels_twice():
     """Two processes that compile one kernel for different types may spoil its cache; those of `FIRST` are compiled when the rest begins."""
     first, rest = called(FIRST), [called(names) for names in TOGETHER]

@@ -36,7 +36,7 @@ def campaign_of(shop, readings, judges, **told):
     return Campaign("C", 25600.0, (), shop.machine.workpiece, shop.toolings, tuple(made))
 
 
-@pytest.mark.slow(15)
+@pytest.mark.slow
 def test_nothing_is_learned_from_cuts_that_judge(shop, readings):
     judges = {len(readings) - 1, len(readings) - 4}
     kept = [each for k, each in enumerate(readings) if k not in judges]

@@ -91,7 +91,7 @@ def turning(start):
     return Campaign(12, gyroscopic, start=start)
 
 
-@pytest.mark.slow(8)
+@pytest.mark.slow
 def test_planes_that_feel_nothing_stay_apart(straight):
     assert straight.found.whole is None
     assert straight.found.machine.whole is None
@@ -102,7 +102,7 @@ def test_planes_that_feel_nothing_stay_apart(straight):
     assert IdentificationCode.PLANES_COUPLED not in {note.code for note in straight.found.notes}
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow
 def test_and_answer_as_if_nobody_had_asked(straight, start):
     """To the last bit what the fit of planes apart gives: from the same cuts that do not tell the other force."""
     untold = [
@@ -161,7 +161,7 @@ def apart(campaign):
     return last.score, last.oblique, last.gyroscopic
 
 
-@pytest.mark.slow(30)
+@pytest.mark.slow
 def test_kinds_of_coupling_are_told_apart(skewed, turning):
     score, out_of_axes, moments = apart(skewed)
     assert score > 2.0 * STRIKES
@@ -247,7 +247,7 @@ def test_it_takes_energy_at_every_speed(kind, request):
         np.testing.assert_allclose(back.transpose(0, 2, 1), one, atol=1e-9 * np.abs(one).max())
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_a_spindle_that_turns_the_other_way_is_told(start):
     """A left-hand cutter, or X and Y exchanged. So few cuts gain less than `OTHER_SENSE`: here any gain counts.
 
@@ -286,7 +286,7 @@ def test_turned_round_it_is_the_same_vector_again():
     np.testing.assert_array_equal(back, theta)
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow
 def test_same_seed_same_answer_in_any_process(start):
     """To the last bit, and of one phase each call: tasks travel as text, last one first."""
     small = Campaign(6, SKEWED, start=start)

@@ -19,7 +19,7 @@ from rcsa_ident.workflows.identify_robot import identify_robot, robot_data
 from rcsa_ident.workflows.simulate import true_robot_tip
 from tests.identification.posed.robots import ELSEWHERE, POSTURES, run, sheet, truth
 
-pytestmark = pytest.mark.slow(120)
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
