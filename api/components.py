@@ -19,6 +19,7 @@ from api.reading.uploads import Uploads
 from api.settings import Settings
 from api.stores.entities import Store
 from api.streams.hub import Hub
+from api.work.answers import Answers
 from api.work.pool import Work
 
 #: Keys or addresses that one limiter remembers.
@@ -56,12 +57,13 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Settings, store, workers, files and uploads, rate limits (also of wrong keys), metrics, force streams, event feeds of jobs, examples,
-    supervisor."""
+    """Settings, store, workers and their answers, files and uploads, rate limits (also of wrong keys), metrics, streams, event feeds of jobs,
+    examples, supervisor."""
 
     settings: Settings
     store: Store
     work: Work
+    answers: Answers
     files: Files
     reader: Work
     uploads: Uploads

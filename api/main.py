@@ -66,6 +66,7 @@ from api.stores.entities import Store
 from api.stores.sql import open_store
 from api.streams.hub import Hub, StreamLimits
 from api.streams.process import Host, StreamProcess
+from api.work.answers import Answers
 from api.work.pool import Pool, Work
 from api.work.worker import QueryLimits
 from rcsa_ident.version import __version__
@@ -109,7 +110,9 @@ def create_app(
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
     made, wrong = Examples(uploads, workers), Rates(*WRONG_KEYS)
-    components = Components(settings, kept, workers, files, readers, uploads, rates, wrong, metrics, hub, feeds, made, supervisor)
+    components = Components(
+        settings, kept, workers, Answers(workers), files, readers, uploads, rates, wrong, metrics, hub, feeds, made, supervisor
+    )
     metrics.registry.register(JobCounts(kept.jobs))
 
     @asynccontextmanager

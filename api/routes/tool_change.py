@@ -128,7 +128,7 @@ async def advice(body: AdviceQuery, request: Request, parts: ThisService, caller
 
 async def _each(parts: Components, call: Any, machine: MachineText, toolings: list[ToolingSource], question: Any) -> list[Any]:
     """Ask for every tooling, on as many workers as are free; the first failure is the answer."""
-    found = await asyncio.gather(*(parts.work.run(call, machine, tooling, question) for tooling in toolings), return_exceptions=True)
+    found = await asyncio.gather(*(parts.answers.of(call, machine, tooling, question) for tooling in toolings), return_exceptions=True)
     for answer in found:
         if isinstance(answer, BaseException):
             raise answer
