@@ -57,7 +57,7 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Settings, store, workers and their answers, files and uploads, rate limits (also of wrong keys), metrics, streams, event feeds of jobs,
+    """Settings, store, workers and their answers, files and uploads, rate limits (also of wrong keys), metrics, streams, event feeds,
     examples, supervisor."""
 
     settings: Settings

@@ -1,8 +1,7 @@
 """One period of a milling cut as a linear map, step by step; arrays and scalars only.
 
-The structure moves exactly, p' = pole p + inputs F, y = 2 Re(outputs p) + constant F. Within a step F is a polynomial through
-Gauss-Lobatto nodes, and its response is exact. What the teeth do stands in `_cut_kernels`: a cut is laid out there once, so that the
-map is applied many times. Loops over scalars throughout: an operation on whole arrays takes compiling a second or more, each.
+What the structure does within a step stands in `_step_kernels`, what the teeth do in `_cut_kernels`: both are laid out there once, so that
+the map is applied many times. Loops over scalars throughout: an operation on whole arrays takes compiling a second or more, each.
 """
 
 from __future__ import annotations
@@ -18,70 +17,18 @@ _FIRST, _EVERY, _MOST = 8, 3, 240
 _LASTS = 1.5
 
 
-@numba.njit(cache=True)
-def _exponential_moments(z, moments):
-    """Integrals over u from 0 to 1 of e^{z (1 - u)} u^k, k = 0, 1, ...; returns e^z."""
-    top = moments.size - 1
-    whole = np.exp(z)
-    if abs(z) > top + 1.0:
-        moments[0] = (whole - 1.0) / z
-        for k in range(1, top + 1):
-            moments[k] = (k * moments[k - 1] - 1.0) / z
-    else:
-        term = 1.0 / (top + 1.0) + 0.0j
-        total = term
-        for n in range(1, 80):
-            term *= z / (top + 1.0 + n)
-            total += term
-            if abs(term) < 1e-17 * abs(total):
-                break
-        moments[top] = total
-        for k in range(top, 0, -1):
-            moments[k - 1] = (z * moments[k] + 1.0) / k
-    return whole
+@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def add_rows(rows, place, factors, sums):
+    """Add factors @ rows[place] to the sums, four rows at once."""
+    for k in range(0, rows.shape[1], 4):
+        a, b, c, d = factors[k], factors[k + 1], factors[k + 2], factors[k + 3]
+        for x in range(rows.shape[2]):
+            sums[x] += a * rows[place, k, x] + b * rows[place, k + 1, x] + c * rows[place, k + 2, x] + d * rows[place, k + 3, x]
 
 
 @numba.njit(cache=True)
-def responses(h, modes, table, decay, drive, seen, echo):
-    """Write what a step of length h makes of a state and of forces at its nodes.
-
-    Parameters
-    ----------
-    decay (q + 1, m), drive (q + 1, m, r) : at the step's end, of p, and of F at each node
-    seen (2, q, r, m) : y and y' at nodes 1..q, real part of it times p
-    echo (2, q, q + 1, r, r), zero before : y and y' at nodes 1..q of F at each node, without the constant
-    """
-    pole, outputs, inputs, _ = modes
-    q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
-    moments = np.empty(q + 1, dtype=np.complex128)
-    for k in range(m):
-        decay[0, k] = 1.0
-        for j in range(1, q + 1):
-            x = table[0, j]
-            decay[j, k] = _exponential_moments(pole[k] * h * x, moments)
-            for a in range(r):
-                seen[0, j - 1, a, k] = 2.0 * outputs[a, k] * decay[j, k]
-                seen[1, j - 1, a, k] = pole[k] * seen[0, j - 1, a, k]
-            for i in range(q + 1):
-                weight, power = 0.0j, h * x
-                for n in range(q + 1):
-                    weight += table[2 + i, n] * power * moments[n]
-                    power *= x
-                for a in range(r):
-                    for b in range(r):
-                        part = 2.0 * outputs[a, k] * weight * inputs[k, b]
-                        echo[0, j - 1, i, a, b] += part.real
-                        echo[1, j - 1, i, a, b] += (pole[k] * part).real
-                        if i == j:
-                            echo[1, j - 1, i, a, b] += (2.0 * outputs[a, k] * inputs[k, b]).real
-                if j == q:
-                    for b in range(r):
-                        drive[i, k, b] = weight * inputs[k, b]
-
-
-@numba.njit(cache=True)
-def _solve(matrix, right):
-    """Gaussian elimination with pivots, in place; right : (n, k)."""
+def _solve(matrix, right, least):
+    """Gaussian elimination in place, right : (n, k); pivots smaller than `least` are taken for as much."""
     n = matrix.shape[0]
     for i in range(n):
         best = i
@@ -93,6 +40,8 @@ def _solve(matrix, right):
                 matrix[i, k], matrix[best, k] = matrix[best, k], matrix[i, k]
             for k in range(right.shape[1]):
                 right[i, k], right[best, k] = right[best, k], right[i, k]
+        if abs(matrix[i, i]) < least:
+            matrix[i, i] = least
         for j in range(i + 1, n):
             factor = matrix[j, i] / matrix[i, i]
             if factor != 0.0:
@@ -117,27 +66,23 @@ def _identity(matrix):
 
 
 @numba.njit(cache=True)
-def prepare(modes, layout, table, frozen):
-    """Each element's responses, and each step's solution for the forces at its nodes.
+def prepare(modes, layout, frozen, steps):
+    """Each step's solution for the forces at its nodes.
 
     Returns
     -------
-    decay, drive, seen, echo : as `responses`, echo with the constant, for elements whose steps have a length of their own
-    same (e,) : the element where an element finds them
     first (n, r, r) : (1 - K R - C V)^-1 at points where the force has to be found anew, V the velocity that a force makes at once
-    later (n, q r, q r) : the same for nodes 1..q of the step that starts at a point
+    later : the same for nodes 1..q of each step, in the order of the steps, as rows for `add_rows`
     total (n, r, r), kinds : stiffness of all delays; 2 where velocities matter, which they do to process damping only, else 1
     """
     pole, outputs, inputs, constant = modes
     places, stiffness, damping = layout.places, layout.stiffness, layout.damping
-    q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
-    count, points = places.shape[0], damping.shape[0]
-    decay = np.empty((count, q + 1, m), dtype=np.complex128)
-    drive = np.zeros((count, q + 1, m, r), dtype=np.complex128)
-    seen = np.zeros((count, 2, q, r, m), dtype=np.complex128)
-    echo = np.zeros((count, 2, q, q + 1, r, r))
-    first, later = np.zeros((points, r, r)), np.zeros((points, q * r, q * r))
-    total, kinds = np.zeros((points, r, r)), 1
+    _, echo, same, free, moved, _ = steps
+    q, m, r, points = echo.shape[2], pole.size, outputs.shape[0], damping.shape[0]
+    first, total, kinds, count = np.zeros((points, r, r)), np.zeros((points, r, r)), 1, 0
+    for e in range(places.shape[0]):
+        count += int(places[e, 2]) if places[e, 3] >= 0 else 0
+    later = np.zeros((count, moved.shape[1], free.shape[2]))
     for point in range(points):
         for a in range(r):
             for b in range(r):
@@ -150,23 +95,10 @@ def prepare(modes, layout, table, frozen):
         for b in range(r):
             for k in range(m):
                 jump[a, b] += (2.0 * outputs[a, k] * inputs[k, b]).real
-    same, small, matrix = np.arange(count), np.empty((r, r)), np.empty((q * r, q * r))
-    for e in range(count):
-        if places[e, 3] < 0:
-            for k in range(m):
-                decay[e, q, k] = np.exp(pole[k] * places[e, 1])
-            continue
-        for other in range(e):
-            if places[other, 3] >= 0 and abs(places[other, 1] - places[e, 1]) < 1e-12 * places[e, 1]:
-                same[e] = same[other]
+    small, matrix, solution, number = np.empty((r, r)), np.empty((q * r, q * r)), np.empty((q * r, q * r)), 0
+    for e in range(places.shape[0]):
         own = same[e]
-        if own == e:
-            responses(places[e, 1], modes, table, decay[e], drive[e], seen[e], echo[e])
-            for j in range(q):
-                for a in range(r):
-                    for b in range(r):
-                        echo[e, 0, j, j + 1, a, b] += constant[a, b]
-        for step in range(int(places[e, 2])):
+        for step in range(int(places[e, 2]) if places[e, 3] >= 0 else 0):
             start = int(places[e, 3]) + step * q
             if step == 0 or frozen:
                 for a in range(r):
@@ -176,7 +108,7 @@ def prepare(modes, layout, table, frozen):
                         for c in range(r):
                             value -= total[start, a, c] * constant[c, b] + damping[start, a, c] * jump[c, b]
                         small[a, b] = value
-                _solve(small, first[start])
+                _solve(small, first[start], 0.0)
             _identity(matrix)
             for j in range(q):
                 node = start if frozen else start + j + 1
@@ -187,112 +119,125 @@ def prepare(modes, layout, table, frozen):
                                 matrix[j * r + a, i * r + b] -= (
                                     total[node, a, c] * echo[own, 0, j, i + 1, c, b] + damping[node, a, c] * echo[own, 1, j, i + 1, c, b]
                                 )
-            _identity(later[start])
-            _solve(matrix, later[start])
-    return decay, drive, seen, echo, same, first, later, total, kinds
+            _identity(solution)
+            _solve(matrix, solution, 0.0)
+            for j in range(q * r):
+                for i in range(q * r):
+                    later[number, i, j] = solution[j, i]
+            number += 1
+    return first, later, total, kinds
 
 
-@numba.njit(cache=True)
-def _earlier(motion, where, weight, point, delay, row):
-    """What the tool did a delay before a point."""
+@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _earlier(motion, where, weight, point, delay, past):
+    """Write what the tool did a delay before a point."""
     place = where[point, delay]
     if weight[point, delay, 0] == 1.0:
-        return motion[place, row]
-    value = 0.0
+        for b in range(past.size):
+            past[b] = motion[place, b]
+        return
+    for b in range(past.size):
+        past[b] = 0.0
     for i in range(weight.shape[2]):
-        value += weight[point, delay, i] * motion[place + i, row]
-    return value
+        share = weight[point, delay, i]
+        for b in range(past.size):
+            past[b] += share * motion[place + i, b]
 
 
 @numba.njit(cache=True)
-def march(state, motion, force, modes, layout, table, frozen, prepared):
+def march(state, motion, force, modes, layout, table, frozen, steps, prepared):
     """Move by one period. `motion` (2 n, r) holds y at all points, the last period's first; `force` (n, r) and the rest is written."""
     pole, outputs, constant = modes.pole, modes.outputs, modes.constant
     places, stiffness, damping, where, weight, _ = layout
-    decay, drive, seen, echo, same, first, later, total, kinds = prepared
-    q, m, r = table.shape[1] - 1, state.size, constant.shape[0]
-    points, delays = damping.shape[0], stiffness.shape[1]
-    free, right, pull = np.zeros((2, q, r)), np.empty(q * r), np.empty(r)
-    for e in range(places.shape[0]):
+    (decay, _, same, free, moved, driven), (first, later, total, kinds) = steps, prepared
+    q, m, r, count = table.shape[1] - 1, state.size, constant.shape[0], places.shape[0]
+    points, delays, pairs = damping.shape[0], stiffness.shape[1], driven.shape[2] // 2
+    # the state and the force at a step's start, the forces at all its nodes, and what nodes 1..q do without their forces
+    known, forces, after = np.zeros(free.shape[1]), np.zeros(driven.shape[1]), np.zeros(2 * pairs)
+    seen, right, found = np.zeros((2, free.shape[2])), np.zeros(later.shape[1]), np.zeros(later.shape[2])
+    pull, past, number = np.empty(r), np.empty(r), 0
+    for k in range(m):
+        known[k], known[pairs + k] = state[k].real, state[k].imag
+    for e in range(count):
         own = same[e]
         if places[e, 3] < 0:
             for k in range(m):
-                state[k] *= decay[own, q, k]
+                turned = decay[own, q, k] * complex(known[k], known[pairs + k])
+                known[k], known[pairs + k] = turned.real, turned.imag
             continue
         for step in range(int(places[e, 2])):
             start = int(places[e, 3]) + step * q
             if step == 0 or frozen:
                 # the force at once: the cut has just changed
                 for a in range(r):
-                    free[0, 0, a], free[1, 0, a], pull[a] = 0.0, 0.0, 0.0
+                    seen[0, a], seen[1, a], pull[a] = 0.0, 0.0, 0.0
                     for k in range(m):
-                        y = 2.0 * outputs[a, k] * state[k]
-                        free[0, 0, a] += y.real
-                        free[1, 0, a] += (pole[k] * y).real
+                        y = 2.0 * outputs[a, k] * complex(known[k], known[pairs + k])
+                        seen[0, a] += y.real
+                        seen[1, a] += (pole[k] * y).real
                 for d in range(delays):
-                    for b in range(r if where[start, d] >= 0 else 0):
-                        value = _earlier(motion, where, weight, start, d, b)
-                        for a in range(r):
-                            pull[a] -= stiffness[start, d, a, b] * value
+                    if where[start, d] < 0:
+                        continue
+                    _earlier(motion, where, weight, start, d, past)
+                    for a in range(r):
+                        for b in range(r):
+                            pull[a] -= stiffness[start, d, a, b] * past[b]
                 for a in range(r):
                     for b in range(r):
-                        pull[a] += total[start, a, b] * free[0, 0, b] + damping[start, a, b] * free[1, 0, b]
+                        pull[a] += total[start, a, b] * seen[0, b] + damping[start, a, b] * seen[1, b]
                 for a in range(r):
                     value = 0.0
                     for b in range(r):
                         value += first[start, a, b] * pull[b]
                     force[start, a] = value
                 for a in range(r):
-                    value = free[0, 0, a]
+                    value = seen[0, a]
                     for b in range(r):
                         value += constant[a, b] * force[start, b]
                     motion[points + start, a] = value
+            for a in range(r):
+                known[2 * pairs + a] = force[start, a]
+            for kind in range(kinds):
+                seen[kind, :] = 0.0
+                add_rows(free, kind * count + own, known, seen[kind])
             for j in range(q):
                 node = start if frozen else start + j + 1
                 for a in range(r):
-                    right[j * r + a] = 0.0
-                    for kind in range(kinds):
-                        y = 0.0
-                        for k in range(m):
-                            y += seen[own, kind, j, a, k].real * state[k].real - seen[own, kind, j, a, k].imag * state[k].imag
-                        for b in range(r):
-                            y += echo[own, kind, j, 0, a, b] * force[start, b]
-                        free[kind, j, a] = y
-                for d in range(delays):
-                    for b in range(r if where[node, d] >= 0 else 0):
-                        if frozen:
-                            # what was there a delay ago changes linearly over the step
-                            begin = _earlier(motion, where, weight, start, d, b)
-                            end = _earlier(motion, where, weight, start + q, d, b)
-                            value = begin + table[0, j + 1] * (end - begin)
-                        else:
-                            value = _earlier(motion, where, weight, node, d, b)
-                        for a in range(r):
-                            right[j * r + a] -= stiffness[node, d, a, b] * value
-                for a in range(r):
-                    for b in range(r):
-                        right[j * r + a] += total[node, a, b] * free[0, j, b]
-                        if kinds == 2:
-                            right[j * r + a] += damping[node, a, b] * free[1, j, b]
-            for j in range(q):
-                for a in range(r):
                     value = 0.0
-                    for i in range(q * r):
-                        value += later[start, j * r + a, i] * right[i]
-                    force[start + j + 1, a] = value
-            for j in range(q):
-                for a in range(r):
-                    value = free[0, j, a]
-                    for i in range(q):
-                        for b in range(r):
-                            value += echo[own, 0, j, i + 1, a, b] * force[start + i + 1, b]
-                    motion[points + start + j + 1, a] = value
-            for k in range(m):
-                value = decay[own, q, k] * state[k]
-                for i in range(q + 1):
                     for b in range(r):
-                        value += drive[own, i, k, b] * force[start + i, b]
-                state[k] = value
+                        value += total[node, a, b] * seen[0, j * r + b]
+                        if kinds == 2:
+                            value += damping[node, a, b] * seen[1, j * r + b]
+                    right[j * r + a] = value
+                for d in range(delays):
+                    if where[node, d] < 0:
+                        continue
+                    _earlier(motion, where, weight, node, d, past)
+                    if frozen:
+                        # what was there a delay ago changes linearly over the step
+                        _earlier(motion, where, weight, start + q, d, pull)
+                        for b in range(r):
+                            past[b] += table[0, j + 1] * (pull[b] - past[b])
+                    for a in range(r):
+                        for b in range(r):
+                            right[j * r + a] -= stiffness[node, d, a, b] * past[b]
+            found[:] = 0.0
+            add_rows(later, number, right, found)
+            add_rows(moved, own, found, seen[0])
+            for a in range(r):
+                forces[a] = force[start, a]
+                for j in range(q):
+                    forces[(j + 1) * r + a] = force[start + j + 1, a] = found[j * r + a]
+                    motion[points + start + j + 1, a] = seen[0, j * r + a]
+            for k in range(m):
+                turned = decay[own, q, k] * complex(known[k], known[pairs + k])
+                after[k], after[pairs + k] = turned.real, turned.imag
+            add_rows(driven, own, forces, after)
+            for k in range(m):
+                known[k], known[pairs + k] = after[k], after[pairs + k]
+            number += 1
+    for k in range(m):
+        state[k] = complex(known[k], known[pairs + k])
 
 
 @numba.njit(cache=True)
@@ -362,7 +307,8 @@ def largest_of_hessenberg(hessenberg):
             for j in range(n):
                 a[i, j] = hessenberg[i, j]
             a[i, i] -= value * (1.0 + 1e-13) + 1e-15 * size
-        _solve(a, column)
+        # of an eigenvalue nothing may be left of a pivot
+        _solve(a, column, 1e-16 * size)
         length = 0.0
         for i in range(n):
             length += column[i, 0].real ** 2 + column[i, 0].imag ** 2
@@ -417,12 +363,12 @@ def _unpack(vector, state, motion, kept):
 
 
 @numba.njit(cache=True)
-def multiplier(modes, layout, table, frozen, tolerance, waves, start):
+def multiplier(modes, layout, table, frozen, steps, tolerance, waves, start):
     """The period map's eigenvalue of largest magnitude by Arnoldi's method [arnoldi1951] without restarts.
 
     Parameters
     ----------
-    modes, layout : `ModeArrays`, `CutLayout`
+    modes, layout, steps : `ModeArrays`, `CutLayout`, and what `_step_kernels.steps` makes of their elements
     frozen : constant coefficients within a step
     tolerance : residual of the eigenvalue, as a share of it, at which the search ends
     waves : whether the vector's forces are wanted
@@ -436,7 +382,7 @@ def multiplier(modes, layout, table, frozen, tolerance, waves, start):
     """
     pole, places, where = modes.pole, layout.places, layout.where
     m, r, points = pole.size, modes.outputs.shape[0], layout.damping.shape[0]
-    prepared = prepare(modes, layout, table, frozen)
+    prepared = prepare(modes, layout, frozen, steps)
     kept = points
     for place in where.ravel():
         # below zero where nothing is looked up
@@ -462,7 +408,7 @@ def multiplier(modes, layout, table, frozen, tolerance, waves, start):
             look += 2
     for n in range(most):
         _unpack(basis[n], state, motion, kept)
-        march(state, motion, force, modes, layout, table, frozen, prepared)
+        march(state, motion, force, modes, layout, table, frozen, steps, prepared)
         after = basis[n + 1]
         for k in range(m):
             after[k], after[m + k] = state[k].real, state[k].imag
@@ -491,7 +437,7 @@ def multiplier(modes, layout, table, frozen, tolerance, waves, start):
         for i in range(size):
             along[i] = vector[i].real if part == 0 else vector[i].imag
         _unpack(along, state, motion, kept)
-        march(state, motion, force, modes, layout, table, frozen, prepared)
+        march(state, motion, force, modes, layout, table, frozen, steps, prepared)
         for point in range(points):
             for a in range(r):
                 forces[point, a] += (1.0 if part == 0 else 1j) * force[point, a]

@@ -13,7 +13,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.rows import Rows, rows_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability import _cut_kernels as kernels
-from rcsa_ident.stability import _monodromy_kernels
+from rcsa_ident.stability import _monodromy_kernels, _step_kernels
 from rcsa_ident.stability.regeneration import directions_of, regeneration, regeneration_of, sliced
 from rcsa_ident.stability.tip_modes import ModeArrays, TipModes
 
@@ -157,7 +157,10 @@ class MonodromyOperator:
         if layout.time.size == 0:
             return self._free(speed)
         first = np.zeros(0) if start is None else np.ascontiguousarray(start.real)
-        value, left, _, vector, force = _monodromy_kernels.multiplier(self.arrays, layout, self.table, self.frozen, residual, waves, first)
+        steps = _step_kernels.steps(self.arrays, layout.places, self.table)
+        value, left, _, vector, force = _monodromy_kernels.multiplier(
+            self.arrays, layout, self.table, self.frozen, steps, residual, waves, first
+        )
         value = complex(value)
         if value.imag < 0.0:
             value, vector, force = value.conjugate(), vector.conj(), force.conj()
@@ -191,10 +194,11 @@ class MonodromyOperator:
         state, force = np.zeros(self.arrays.pole.size, dtype=complex), np.zeros((points, r))
         # the period before, and the one that follows it
         motion = np.concatenate([np.stack([np.interp(layout.time, at, each) for each in noise], axis=1), np.zeros((points, r))])
-        prepared = _monodromy_kernels.prepare(self.arrays, layout, self.table, self.frozen)
+        steps = _step_kernels.steps(self.arrays, layout.places, self.table)
+        prepared = _monodromy_kernels.prepare(self.arrays, layout, self.frozen, steps)
         first = largest = 0.0
         for _ in range(periods + 1):
-            _monodromy_kernels.march(state, motion, force, self.arrays, layout, self.table, self.frozen, prepared)
+            _monodromy_kernels.march(state, motion, force, self.arrays, layout, self.table, self.frozen, steps, prepared)
             motion[:points] = motion[points:]
             peak = float(np.max(np.abs(motion[points:])))
             first = first or max(peak, 1e-300)

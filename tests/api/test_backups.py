@@ -67,7 +67,7 @@ def answers(folder: Path, scratch: Path) -> list[object]:
         for each in client.recordings(campaign.id):
             client.recording_file(campaign.id, each.name, scratch)
             told += [each, scratch.read_bytes(), client.signal(campaign.id, each.name)]
-        told.append(client.lobes(machine.id, "T1", speeds={"from_rpm": 9000, "to_rpm": 10000, "step_rpm": 500}))
+        told.append(client.lobes(machine.id, "T1", recommend=False, speeds={"from_rpm": 9000, "to_rpm": 10000, "step_rpm": 500}))
     store.close()
     return told
 

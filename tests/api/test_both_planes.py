@@ -76,12 +76,12 @@ def test_its_modes_say_their_directions(shop, turning):
 def test_lobes_and_advice_take_them(shop, tmp_path):
     client, id = shop
     speeds = {"from_rpm": 6000, "to_rpm": 13000, "step_rpm": 1000}
-    found = client.lobes(id, "T1", speeds=speeds, bands=False).toolings[0]
+    found = client.lobes(id, "T1", speeds=speeds, bands=False, recommend=False).toolings[0]
     alone = json.loads(client.identification(id).model_dump_json())
     del alone["both_planes"]
     other = client.make_machine("apart").id
     client.identify(other, json.dumps(alone))
-    apart = client.lobes(other, "T1", speeds=speeds, bands=False).toolings[0]
+    apart = client.lobes(other, "T1", speeds=speeds, bands=False, recommend=False).toolings[0]
     assert np.max(np.abs(np.array(found.limit_depth_mm) / np.array(apart.limit_depth_mm) - 1.0)) > 0.02
     assert client.advice(id, "T1", speeds=speeds, cut={"feed_per_tooth_mm": 0.1}).toolings[0].highest_removal
 

@@ -222,7 +222,7 @@ def test_a_flange_measured_too_coarsely_is_said(client, text):
     id = client.make_machine("m").id
     client.identify(id, "\n".join([head, *rows[::60]]) + "\n")
     client.write_tooling("T1", by_hand.TOOLING)
-    (lobes,) = client.lobes(id, "T1", speeds=SPEEDS, cut=CUT).toolings
+    (lobes,) = client.lobes(id, "T1", speeds=SPEEDS, cut=CUT, recommend=False).toolings
     for warnings in (client.tooltip(id, "T1").warnings, lobes.warnings):
         for axis in "XY":
             assert any(w.startswith(f"{axis}: flange measured too coarsely") for w in warnings)

@@ -163,14 +163,14 @@ def test_a_tip_on_a_robot_is_the_library_s(client, tx200, tmp_path):
 
 def test_lobes_on_a_robot_follow_its_posture(client, tx200):
     client.write_tooling("T1", by_hand.TOOLING)
-    here = client.lobes(tx200, "T1", cut=CUT, speeds=SPEEDS, bands=False)
+    here = client.lobes(tx200, "T1", cut=CUT, speeds=SPEEDS, bands=False, recommend=False)
     assert here.machine == "tx200"
-    other = client.lobes({**tx200, "posture_deg": NEAR}, "T1", cut=CUT, speeds=SPEEDS, bands=False)
+    other = client.lobes({**tx200, "posture_deg": NEAR}, "T1", cut=CUT, speeds=SPEEDS, bands=False, recommend=False)
     one, two = here.toolings[0], other.toolings[0]
     assert one.spindle_speed_rpm == two.spindle_speed_rpm
     assert one.limit_depth_mm != two.limit_depth_mm
     # given as it is the same robot answers the same
-    inline = client.lobes({**tx200, "robot": robot_keys(robot("tx200"))}, "T1", cut=CUT, speeds=SPEEDS, bands=False)
+    inline = client.lobes({**tx200, "robot": robot_keys(robot("tx200"))}, "T1", cut=CUT, speeds=SPEEDS, bands=False, recommend=False)
     assert inline.machine == "Stäubli TX200"
     np.testing.assert_allclose(np.array(inline.toolings[0].limit_depth_mm, float), np.array(one.limit_depth_mm, float), rtol=1e-9)
     assert client.advice(tx200, "T1", cut={**CUT, "feed_per_tooth_mm": 0.05}, speeds=SPEEDS).toolings[0].highest_removal

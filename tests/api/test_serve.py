@@ -166,7 +166,7 @@ def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
         id = client.make_machine("m", repeat="k").id
         client.identify(id, result)
         client.write_tooling("T1", by_hand.TOOLING)
-        first = client.lobes(id, "T1")
+        first = client.lobes(id, "T1", recommend=False)
         with Client(served.url) as nobody:
             refused(401, nobody.machine, id)
         # no farewell
@@ -176,7 +176,7 @@ def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
         assert client.make_machine("m", repeat="k").id == id
         assert client.tooling_file("T1") == by_hand.TOOLING
         # the same numbers to the last digit
-        assert client.lobes(id, "T1") == first
+        assert client.lobes(id, "T1", recommend=False) == first
         served.process.terminate()
         assert served.process.wait(PATIENCE) in (0, -15)
     lines = [json.loads(line) for line in served.log.read_text().splitlines()]
@@ -277,7 +277,7 @@ def test_a_long_question_ends_with_its_client_and_with_the_service(tmp_path, res
             httpx2.post(f"{served.url}/v1/lobes", json=question, timeout=1.0)
         until(lambda: told(400))
         # its process is free for the next
-        assert client.lobes(id, "T1")
+        assert client.lobes(id, "T1", recommend=False)
         asked = threading.Thread(target=lambda: answers.append(httpx2.post(f"{served.url}/v1/lobes", json=question, timeout=PATIENCE)))
         asked.start()
         until(lambda: "rcsa_ident_work_waiting 1.0" in httpx2.get(f"{served.url}/metrics").text)

@@ -75,7 +75,7 @@ def test_several_toolings_are_compared(shop):
     client, id = shop
     long = example()
     long["tool"]["stickout_mm"] = 60.0
-    found = client.lobes(id, "T1", example(), long, speeds=SPEEDS, bands=False).toolings
+    found = client.lobes(id, "T1", example(), long, speeds=SPEEDS, bands=False, recommend=False).toolings
     assert [f.tooling for f in found] == ["T1", "S1-ER32", "S1-ER32"]
     assert found[1].limit_depth_mm != found[2].limit_depth_mm
     assert found[0].limit_depth_low_mm is None
@@ -84,7 +84,7 @@ def test_several_toolings_are_compared(shop):
 @pytest.mark.slow
 def test_stable_speeds_are_null(shop):
     client, id = shop
-    (found,) = client.lobes(id, "T1", speeds=SPEEDS, max_depth_mm=1e-3).toolings
+    (found,) = client.lobes(id, "T1", speeds=SPEEDS, max_depth_mm=1e-3, recommend=False).toolings
     assert found.limit_depth_mm == found.chatter_frequency_hz == found.lobe == [None] * 7
     assert found.best_speeds[0].limit_depth_mm is None
 
@@ -105,7 +105,7 @@ def test_the_cut_counts(shop):
     client, id = shop
 
     def limits(**cut):
-        return np.array(client.lobes(id, "T1", speeds=SPEEDS, bands=False, cut=cut).toolings[0].limit_depth_mm)
+        return np.array(client.lobes(id, "T1", speeds=SPEEDS, bands=False, recommend=False, cut=cut).toolings[0].limit_depth_mm)
 
     plain = limits(ktc_mpa=902.0, krc=0.26)
     np.testing.assert_allclose(limits(), plain, rtol=1e-12)
@@ -125,7 +125,7 @@ def test_tested_cuts_are_counted(shop, method):
     """Each at its own speed and to its own depth, whatever speeds and depth the lobes are asked for; in any order."""
     client, id = shop
     speeds = {"from_rpm": 7000, "to_rpm": 9000, "step_rpm": 1000}
-    first, _, last = client.lobes(id, "T1", speeds=speeds, method=method, bands=False).toolings[0].limit_depth_mm
+    first, _, last = client.lobes(id, "T1", speeds=speeds, method=method, bands=False, recommend=False).toolings[0].limit_depth_mm
     seen = [
         (9000, 0.95 * last, "stable"),
         (9000, 1.05 * last, "marginal"),
@@ -134,7 +134,14 @@ def test_tested_cuts_are_counted(shop, method):
     ]
     seen += [(7000, 1.05 * first, "stable"), (9000, 1.05 * last, "chatter"), (7000, 0.95 * first, "marginal")]
     tested = [dict(zip(("spindle_speed_rpm", "axial_depth_mm", "verdict"), each, strict=True)) for each in seen]
-    asked = {"speeds": {"from_rpm": 8000, "to_rpm": 8000}, "max_depth_mm": 0.2, "method": method, "bands": False, "tested": tested}
+    asked = {
+        "speeds": {"from_rpm": 8000, "to_rpm": 8000},
+        "max_depth_mm": 0.2,
+        "method": method,
+        "bands": False,
+        "recommend": False,
+        "tested": tested,
+    }
     (found,) = client.lobes(id, "T1", **asked).toolings
     assert found.tested.model_dump() == {
         "stable_stable": 1, "stable_chatter": 1, "chatter_stable": 1, "chatter_chatter": 2, "stable_marginal": 1, "chatter_marginal": 1,
@@ -153,7 +160,9 @@ def test_materials_are_those_of_the_library(shop):
     assert [each.name for each in listed] == [each.name for each in materials()]
     steel = next(each for each in listed if each.name.startswith("Steel"))
     given = {"ktc_mpa": steel.ktc_mpa, "krc": steel.krc, "kte_n_per_mm": steel.kte_n_per_mm, "kre_n_per_mm": steel.kre_n_per_mm}
-    by_name, by_number = (client.lobes(id, "T1", speeds=SPEEDS, cut=cut).toolings[0] for cut in ({"material": steel.name}, given))
+    by_name, by_number = (
+        client.lobes(id, "T1", speeds=SPEEDS, cut=cut, recommend=False).toolings[0] for cut in ({"material": steel.name}, given)
+    )
     np.testing.assert_allclose(by_name.limit_depth_mm, by_number.limit_depth_mm, rtol=1e-12)
     spreads = [each.coefficients.tangential_spread for each in materials()]
     np.testing.assert_allclose([each.ktc_spread_percent for each in listed], 100.0 * np.array(spreads), rtol=1e-12)
@@ -177,7 +186,7 @@ def test_a_holder_of_the_catalogue_makes_a_tooling(shop):
     assert set(client.holder("HSK-A63", "hydraulic", 12.0).spread.model_dump().values()) == {None}
     assert client.holder("HSK-A63", "hydraulic", 12.0).contact is None
     tooling = example(holder=found.holder.model_dump(exclude_none=True), contact=contact.model_dump())
-    (answer,) = client.lobes(id, tooling, speeds=SPEEDS).toolings
+    (answer,) = client.lobes(id, tooling, speeds=SPEEDS, recommend=False).toolings
     assert any("catalogue's assumed values of a collet" in each for each in answer.warnings)
     assert refused(422, client.holder, "HSK-A63", "ER32", 25.0).errors[0].field == "bore_mm"
     assert refused(422, client.holder, "HSK-A32", "ER32", 12.0).errors[0].field == "taper"
@@ -383,13 +392,15 @@ def test_numbers_that_lead_nowhere_are_told_not_thrown(shop):
 def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
     """The plain road gives the same limits; where it would take too long it is refused, and so are too many frequencies."""
     client, id = shop
-    quick = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
+    quick, answers = client.lobes(id, "T1", speeds=SPEEDS).toolings[0], client.http.app.state.components.answers
+    answers.kept.clear()
     monkeypatch.setattr(tasks, "_machines", MachineCache(4))
     monkeypatch.setattr(identified, "MOST_KEPT", 10)
     slow = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
     for one, other in zip(slow.around, quick.around, strict=True):
         np.testing.assert_allclose(one.limit_depth_low_mm, other.limit_depth_low_mm, rtol=1e-3)
     np.testing.assert_allclose(slow.limit_depth_mm, quick.limit_depth_mm, rtol=1e-9)
+    answers.kept.clear()
     monkeypatch.setattr(tool_change, "_SPREAD_SECONDS", 1.0)
     assert refused(422, client.lobes, id, "T1", speeds=SPEEDS).errors[0].field == "speeds"
     assert refused(422, client.tooltip, id, "T1").errors[0].field == "step_hz"
@@ -428,12 +439,12 @@ def test_unusual_values_are_warned_of_in_every_answer(shop):
         "radial immersion is 0.5 %, but usual are 1.5 to 100 %: was 50 % meant?",
     )
     for found in (
-        client.lobes(id, tooling, speeds=SPEEDS, cut=cut).toolings[0],
+        client.lobes(id, tooling, speeds=SPEEDS, cut=cut, recommend=False).toolings[0],
         client.advice(id, tooling, speeds=SPEEDS, cut=cut).toolings[0],
     ):
         assert [any(warning.startswith(words) for warning in found.warnings) for words in told] == [True] * 3
     assert any(warning.startswith(told[0]) for warning in client.tooltip(id, tooling).warnings)
-    usual = client.lobes(id, example(), speeds=SPEEDS).toolings[0]
+    usual = client.lobes(id, example(), speeds=SPEEDS, recommend=False).toolings[0]
     assert not [warning for warning in usual.warnings if "usual" in warning]
 
 

@@ -53,7 +53,7 @@ def test_limits_are_those_of_both_and_a_tip_is_the_tools(shop, tmp_path):
     rigid = client.make_machine("rigid").id
     client.identify(rigid, by_hand.result_text(tmp_path))
     assert client.modes(rigid).workpiece_side == {}
-    one, other = (client.lobes(each, "T1", speeds=SPEEDS, bands=False).toolings[0] for each in (id, rigid))
+    one, other = (client.lobes(each, "T1", speeds=SPEEDS, bands=False, recommend=False).toolings[0] for each in (id, rigid))
     assert np.max(np.array(other.limit_depth_mm) / np.array(one.limit_depth_mm)) > 3.0
     tips = [client.tooltip(each, "T1", from_hz=400, to_hz=900, step_hz=5) for each in (id, rigid)]
     assert tips[0].axes == tips[1].axes
