@@ -24,6 +24,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 #: Fixtures behind which a browser, a service, a database or a cluster runs: whoever asks for one is slow.
 _PROCESSES = {"browser", "served", "postgres_server"}
+#: Rooms whose files share what takes long to make.
+_SHARED = ("tests/web/", "tests/front_door/")
 #: Seconds of each function by its file, as the last whole run has found them.
 _DURATIONS = Path(__file__).with_name("durations.json")
 _seconds: Counter[str] = Counter()
@@ -96,8 +98,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _room(name: str) -> str:
-    """What stays with one worker: a file, whose fixtures are paid once, or all files of the page, which share service and browser."""
-    return "tests/web" if name.startswith("tests/web/") else name.partition("::")[0]
+    """What stays with one worker: a file, whose fixtures are paid once, or all files that share a service, a browser, a machine."""
+    return next((room for room in _SHARED if name.startswith(room)), name.partition("::")[0])
 
 
 class _Rooms(LoadScopeScheduling):

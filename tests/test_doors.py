@@ -97,6 +97,7 @@ def same(one, other, rel=1e-6):
         assert one == other
 
 
+@pytest.mark.slow
 def test_limit_recommendation_and_speeds_are_the_same_at_every_door(command, rest, page):
     by_command, by_rest = command[0], rest[0]
     keys = set(lobes_summary(page.advice))

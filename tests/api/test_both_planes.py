@@ -73,6 +73,7 @@ def test_its_modes_say_their_directions(shop, turning):
     assert len(client.identification(id).both_planes.modes) == 4
 
 
+@pytest.mark.slow
 def test_lobes_and_advice_take_them(shop, tmp_path):
     client, id = shop
     speeds = {"from_rpm": 6000, "to_rpm": 13000, "step_rpm": 1000}

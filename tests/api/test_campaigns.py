@@ -363,6 +363,7 @@ def test_what_an_identification_reads(uploaded, tmp_path, store):
             assert one is None or (one.rate == other.rate and one.samples.tobytes() == other.samples.tobytes())
 
 
+@pytest.mark.slow
 def test_a_campaign_that_can_not_be_loaded_says_why(client, machine, store):
     made, files = client.make_campaign(machine, declared()), client.http.app.state.components.files
     with pytest.raises(InputError, match="no recording of a cut"):

@@ -70,6 +70,7 @@ HEAD = b"POST /v1/machines HTTP/1.1\r\nHost: localhost\r\nContent-Type: applicat
 GET = b"GET /v1/machines HTTP/1.1\r\nHost: localhost\r\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", [b"Content-Length: 12\r\n\r\n{", b"Transfer-Encoding: chunked\r\n\r\nFFFF\r\n{"])
 def test_a_body_that_stops(port, body):
     answer = told(port, HEAD + body)
@@ -78,6 +79,7 @@ def test_a_body_that_stops(port, body):
     assert b"the body arrives too slowly" in answer
 
 
+@pytest.mark.slow
 def test_a_body_that_trickles(port):
     answer = told(port, HEAD + b"Content-Length: 1000\r\n\r\n", *[b" "] * 40, pause=0.05)
     assert answer.startswith(b"HTTP/1.1 408")

@@ -81,6 +81,7 @@ def test_the_example_takes_nothing_of_ones_own(http, client, monkeypatch):
     assert [campaign.id for campaign in client.campaigns(made.machine)] == [made.campaign]
 
 
+@pytest.mark.slow
 def test_what_is_deleted_is_named_before(http, client, monkeypatch):
     """Machine, campaigns and recordings; what came since then is not deleted with them."""
     monkeypatch.setattr(http.app.state.components.examples, "fill", lambda campaign: None)

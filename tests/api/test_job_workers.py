@@ -188,6 +188,7 @@ def test_a_job_that_goes_on_says_nothing_of_starting_over(store, machine):
     assert "note" not in [event.kind for event in store.jobs.events(id, 0, 100)]
 
 
+@pytest.mark.slow
 def test_a_step_that_cannot_be_stored_loses_no_work(quiet, caplog):
     """Its value is in hand: the job goes on. A process that dies has it start over, and not for ever."""
     value = object()

@@ -179,6 +179,7 @@ def working(folder: Path, url: str, name: str) -> Iterator[subprocess.Popen]:
             kill([*descendants(running.pid), running.pid])
 
 
+@pytest.mark.witness
 def test_several_workers_share_jobs_and_take_over(request, tmp_path, result):
     """Two commands on one PostgreSQL: every job is carried out once; those of the one that is killed are ended by the other."""
     url = database(request, POSTGRESQL, tmp_path)

@@ -187,6 +187,7 @@ def test_keys_and_groups(guarded_http, result):
         assert http.post(path, headers={"X-API-Key": keys["other"]}).status_code == 404
 
 
+@pytest.mark.slow
 def test_too_many_cuts_are_refused_in_words(tmp_path, result):
     class Slow(Here):
         async def run(self, call, *arguments):

@@ -76,6 +76,7 @@ def test_as_a_form_and_as_a_body(http, client, sound):
     assert as_form.json() == as_body.json() | {"recording": "cut.wav"} == json.loads(client.listen(sound, **query).model_dump_json())
 
 
+@pytest.mark.slow
 def test_curves_are_small_and_show_what_is_said(http):
     """Also of a minute at the rate of a phone."""
     raw = wav(samples(60.0, rate=48000.0), 48000)
@@ -189,6 +190,7 @@ def test_hostile_recordings_are_refused_and_leave_nothing(in_earnest):
     assert files_in(folder) == []
 
 
+@pytest.mark.slow
 def test_an_upload_without_an_end(store, tmp_path):
     with service(store, tmp_path, max_upload_bytes=100_000) as http:
         part = b'--b\r\nContent-Disposition: form-data; name="recording"; filename="x.wav"\r\n\r\n'
@@ -225,6 +227,7 @@ def test_too_many_at_once(store, tmp_path):
         assert http.post("/v1/listen", content=wav(), headers=WAV).status_code == 200
 
 
+@pytest.mark.slow
 def test_hits_to_a_receptance(client, tmp_path):
     first, second = tmp_path / "first.csv", tmp_path / "second.csv"
     first.write_bytes(text_of_hits())

@@ -193,6 +193,7 @@ def test_limits_come_before_the_answer(shop, store, tmp_path, monkeypatch):
     assert PARTIAL not in [event.kind for event in store.jobs.events(job, 0, 1000)]
 
 
+@pytest.mark.slow
 def test_who_waits_is_told_its_place_and_for_how_long(shop, store):
     """Also when it moves up, in which nothing of its own happens."""
     client, id = shop

@@ -92,6 +92,7 @@ def test_curves_begin_where_the_measurement_begins(client, text):
     assert client.tooltip(id, "T1").frequency_hz[0] == client.frf(id).frequency_hz[0] == 500.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["zero-order", "multi-frequency"])
 def test_lobes_are_those_of_the_machine_that_was_measured(measured, method):
     client, id, identified = measured
@@ -106,6 +107,7 @@ def test_lobes_are_those_of_the_machine_that_was_measured(measured, method):
     assert not any("identification" in w for w in own.warnings)
 
 
+@pytest.mark.slow
 def test_advice_is_that_of_the_machine_that_was_measured(measured):
     client, id, identified = measured
     asked = {"speeds": SPEEDS, "cut": CUT | {"feed_per_tooth_mm": 0.1}, "bands": False}

@@ -24,6 +24,7 @@ def campaign(**changed):
     return data
 
 
+@pytest.mark.slow
 def test_a_pass_is_declared_read_and_judged(client, tmp_path):
     made = Pass()
     machine = client.make_machine("m").id

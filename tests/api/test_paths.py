@@ -240,6 +240,7 @@ def test_what_cannot_be_cut_is_refused_by_its_field(shop, program, kind, changed
     assert field is None or problem.errors[0].field == field, problem
 
 
+@pytest.mark.slow
 def test_files_that_are_none_are_refused(shop, program, tmp_path):
     client, id = shop
     for name, text, told in (

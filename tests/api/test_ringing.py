@@ -41,6 +41,7 @@ def keys_of(folder):
     return tomllib.loads((folder / "DRAWN.toml").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_the_same_nouns_as_the_command(library, rung, tmp_path):
     folder, grams = rung
     found = library.ring("T", folder / "whole.wav", bare_tool=[folder / "tool.wav"], mass_g=grams)
@@ -125,6 +126,7 @@ def test_wrong_forms(http, library, rung):
     assert broken.status_code == 422
 
 
+@pytest.mark.slow
 def test_keys_and_groups(guarded_http, rung):
     http, keys = guarded_http
     folder, _ = rung

@@ -89,6 +89,7 @@ def test_stable_speeds_are_null(shop):
     assert found.best_speeds[0].limit_depth_mm is None
 
 
+@pytest.mark.slow
 def test_a_preview_is_there_without_recommended_cuts(shop):
     client, id = shop
     (preview,) = client.lobes(id, "T1", speeds=SPEEDS, recommend=False).toolings
@@ -198,6 +199,7 @@ def run(*arguments):
     return answer
 
 
+@pytest.mark.slow
 def test_a_holder_of_the_catalogue_gives_one_depth_by_all_doors(shop, result, tmp_path):
     """Command line, service and Python: what `holders` hands out is as uncertain as it says, and the depth names what it depends on."""
     client, id = shop
@@ -317,6 +319,7 @@ def test_unequal_pitch_and_a_shape_are_told_with_every_answer(shop):
     assert not any("cylinder" in warning for warning in client.tooltip(id, "T1", step_hz=10).warnings)
 
 
+@pytest.mark.slow
 def test_advice_stands_by_the_lobes(shop):
     client, id = shop
     cut = {"feed_per_tooth_mm": 0.1}

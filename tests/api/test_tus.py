@@ -198,6 +198,7 @@ def test_the_same_content_goes_on_where_it_stands(place):
     assert sent(client, where, raw[1000:], 1000).status_code == 204
 
 
+@pytest.mark.slow
 def test_a_file_that_is_not_the_announced_one_is_refused_at_its_end(place):
     client, path, raw = place
     headers = SAYS | {"Upload-Length": str(len(raw)), "Upload-Metadata": metadata(filename=NAME, sha256="ABC")}
@@ -316,6 +317,7 @@ def test_a_kill_between_the_last_byte_and_its_acknowledgement(tmp_path, when):
         assert len(list((folder / "files").glob("*/uploads/*"))) == 1
 
 
+@pytest.mark.witness
 @pytest.mark.slow
 def test_a_client_that_others_wrote_goes_on_after_a_kill(tmp_path):
     raw = content(tmp_path)

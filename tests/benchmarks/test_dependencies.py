@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from benchmarks.dependencies import needed, required, table
 from tests.fixtures.paths import ROOT
 
@@ -17,6 +19,7 @@ def test_the_page_names_what_is_required_and_nothing_else():
     assert names((ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")) == required()
 
 
+@pytest.mark.slow
 def test_the_table_is_made_from_what_is_installed():
     made = table({"numpy": "9.9, 2030-01"})
     assert names(made) == required()

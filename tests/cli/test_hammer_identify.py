@@ -27,6 +27,7 @@ def hit(tmp_path_factory):
     return write_hit(tmp_path_factory.mktemp("hit"))
 
 
+@pytest.mark.slow
 def test_check_tells_what_is_used(hit):
     found = run("check", hit)
     assert found.exit_code == 0, found.stderr

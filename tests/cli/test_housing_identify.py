@@ -68,6 +68,7 @@ def test_accelerometers_alone_say_how_far_they_can_be_trusted(folder, tmp_path):
     assert within(tmp_path / "R.json", tuple(np.inf if a in doubted else 0.02 for a in "XY"))
 
 
+@pytest.mark.slow
 def test_check_says_what_such_a_cut_tells(folder):
     found = run("check", folder, "--json")
     assert found.exit_code == 0, found.output

@@ -263,6 +263,7 @@ def test_advice_from_modes(shop):
     assert "highest removal rate" in run(*common, "--depth-mm", 40, "--max-depth-mm", 50).stdout
 
 
+@pytest.mark.slow
 def test_a_card_says_what_the_answer_says(result_file, tmp_path):
     """The recommended cuts of every tooling, with drawing, conditions, warnings and what they were computed from."""
     tool = tmp_path / "A & B.toml"
@@ -353,6 +354,7 @@ def test_a_stickout_that_nothing_holds(result_file):
     assert "at most 88 mm" in run("advise", result_file, result_file.parent / "T1.toml", *FEED, "--stickout-mm", "95", code=2).stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["uff", "uff-binary", "csv"])
 def test_an_exported_tip_gives_the_lobes_of_the_result(result_file, tmp_path, form):
     tool, file = result_file.parent / "T1.toml", tmp_path / f"tip.{'csv' if form == 'csv' else 'uff'}"

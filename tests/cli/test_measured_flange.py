@@ -64,6 +64,7 @@ def test_curves_begin_where_the_measurement_begins(tmp_path, tooling_file, flang
     assert "500 to 3000 Hz" in run("tooltip", flange, tooling_file, "--out", tmp_path / "F.csv", "--from", 100, code=2).stderr
 
 
+@pytest.mark.slow
 def test_lobes_and_advice_are_those_of_the_machine_that_was_measured(tmp_path, result_file, tooling_file, flange):
     lobes, advice = [], []
     for name, file, more in (("a", flange, ()), ("b", result_file, ("--no-bands",))):

@@ -52,6 +52,7 @@ def rows(path):
     return list(csv.DictReader(path.read_text().splitlines()))
 
 
+@pytest.mark.slow
 def test_stability_along_a_program(files, tmp_path):
     out, plot, other = (tmp_path / name for name in ("STABILITY.csv", "MARGIN.png", "ERROR.svg"))
     found = run("stability", *files, *STOCK, *CUT, "--out", out, "--plot", plot, "--plot-error", other, "--step-mm", 1, "--json")
@@ -79,6 +80,7 @@ def test_stability_along_a_program(files, tmp_path):
     assert "walls are off by" in words.output
 
 
+@pytest.mark.slow
 def test_milling_a_program(files, tmp_path):
     out, surface = tmp_path / "FORCES.csv", tmp_path / "SURFACE.csv"
     found = run("mill", *files, *STOCK, *CUT, "--out", out, "--surface", surface, "--steps", 180, "--json")
@@ -137,6 +139,7 @@ def test_a_picture_of_another_kind_is_refused_before_the_work(files, tmp_path, o
     assert not (tmp_path / "OUT.csv").exists()
 
 
+@pytest.mark.slow
 def test_what_is_odd_about_a_tooling_is_said(files, tmp_path):
     """A holder with a very thin wall."""
     odd = tmp_path / "ODD.toml"

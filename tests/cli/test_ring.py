@@ -24,6 +24,7 @@ def rung(tmp_path_factory):
     return folder, *rung_tooling(folder)
 
 
+@pytest.mark.slow
 def test_a_drawing_is_corrected(rung):
     folder, grams, true = rung
     out = folder / "RUNG.toml"

@@ -91,6 +91,7 @@ def test_tip_is_written_with_its_cross_terms(tmp_path):
     assert 20.0 < told["peaks"]["X"]["frequency_hz"] < 25.0
 
 
+@pytest.mark.slow
 def test_lobes_at_a_posture(tmp_path):
     out, plot = tmp_path / "LOBES.csv", tmp_path / "LOBES.svg"
     speeds = ("--speed-from", 8000, "--speed-to", 14_000, "--speed-step", 500)

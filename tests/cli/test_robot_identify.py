@@ -35,6 +35,7 @@ def tables(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_springs_from_static_tests(tables, tmp_path):
     out, truth = tmp_path / "FOUND.toml", robot("kr210")
     start = tmp_path / "START.toml"

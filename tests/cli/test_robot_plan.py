@@ -37,6 +37,7 @@ def test_the_published_plan(tmp_path):
     assert told["warnings"] == []
 
 
+@pytest.mark.slow
 def test_static_tests_drawn_and_from_a_table(tmp_path):
     out, table = tmp_path / "POSTURES.csv", tmp_path / "GIVEN.csv"
     drawn = run("robot", "plan", TX200, "--count", 2, "--candidates", 12, "--box", BOX, "--seed", 3, "--out", out, "--json")

@@ -148,6 +148,7 @@ def test_the_form_of_the_normal_with_slopes_is_that_of_a_rigid_body():
         assert np.allclose(np.tensordot(q, exponential_form(products)[i], 1), np.outer(jacobian.T @ e, jacobian.T @ n), atol=1e-15)
 
 
+@pytest.mark.slow
 def test_lines_are_those_of_the_force_over_the_rotation():
     cutter = Cutter(3, 0.016, helix=30 * DEG, pitch=np.radians([110.0, 120.0, 130.0]), profile=Profile.bull_nose(0.016, 0.003))
     rows = rows_of(cutter, Block(-0.008, 0.002), 0.0045, 0.1e-3)

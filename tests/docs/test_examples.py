@@ -54,6 +54,7 @@ def run(tests: list[doctest.DocTest]) -> int:
     return runner.summarize(verbose=False).attempted
 
 
+@pytest.mark.witness
 @pytest.mark.slow
 def test_examples_are_true(folder, monkeypatch):
     """All of the package, in one folder: what `identify` records and saves, others read."""

@@ -202,6 +202,7 @@ class Shared:
         return np.zeros((0, OMEGA.size), dtype=complex)
 
 
+@pytest.mark.slow
 def test_what_is_common_is_drawn_once_for_all_blocks():
     tip = UncertainReceptance(OMEGA, known().values, ROWS, ROWS, Shared())
     one, other = (part.change[:, :, 0, 0] for part in Shared().at(np.arange(OMEGA.size)))

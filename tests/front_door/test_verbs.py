@@ -143,6 +143,7 @@ def test_forces_of_a_file_need_sensors(nouns):
         ri.estimate_forces(nouns.flange, nouns.tooling, "cut.h5")
 
 
+@pytest.mark.slow
 def test_advise_takes_a_result(nouns):
     speeds = ri.rpm(6000, 9000, 500)
     here, there = (ri.advise(each, nouns.tooling, speeds=speeds) for each in (nouns.read, nouns.machine))

@@ -55,6 +55,7 @@ def errors():
     return found
 
 
+@pytest.mark.witness
 @pytest.mark.slow
 def test_a_known_corner_radius_costs_nothing_and_an_unknown_one_much(errors):
     sharp, known, ignored = (np.linalg.norm(errors[pair]) for pair in ((0.0, 0.0), (RADIUS, RADIUS), (RADIUS, 0.0)))

@@ -117,6 +117,7 @@ def of_one_tap(shop, clamped, drawn=None, cuts=None):
     return with_rough_toolings(data, rough, [rough_tool_holder(each.assembly, HIGHEST) for each in told.values()])
 
 
+@pytest.mark.slow
 def test_slopes_of_a_tap_are_those_of_its_residuals(shop, few):
     """By what the drawings do not tell: differences of two steps, whose error of second order is taken out."""
     data = of_one_tap(shop, shop.held_out, cuts=few)

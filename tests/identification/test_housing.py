@@ -154,6 +154,7 @@ def test_a_tooling_that_never_cut_follows_from_three_that_did(shop, data):
     assert max(errors(shop, louder)) < 0.25
 
 
+@pytest.mark.slow
 def test_of_two_toolings_all_starts_are_tried_and_the_likeliest_of_each_axis_on_the_other(shop):
     """One axis that has come to an answer twice is no reason to stop: what it came to may be a side minimum, and so may the other's."""
     first, second, _ = shop.toolings

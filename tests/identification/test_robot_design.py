@@ -92,6 +92,7 @@ def test_what_tests_tell_is_what_a_fit_is_sure_of():
     np.testing.assert_allclose(found.deviation / found.believed, planned, rtol=0.35)
 
 
+@pytest.mark.slow
 def test_moving_on_gains_beside_the_best_of_those_drawn():
     arm = robot("kr210")
     experiment, reach = static_tests(arm, 1000.0), Reach(arm, CELL)
@@ -108,6 +109,7 @@ def test_moving_on_gains_beside_the_best_of_those_drawn():
     np.testing.assert_array_equal(same.postures, moved.postures)
 
 
+@pytest.mark.slow
 def test_planned_postures_beside_drawn_ones():
     """Four postures of each, seed by seed: less is left open, and the compliance at other places is nearer the truth."""
     arm, noise, forces = robot("kr210"), 6e-5, [1000.0 * level for level in LEVELS]

@@ -37,6 +37,7 @@ def believed(rng):
     return TRUTH.with_springs(TRUTH.chain().stiffness * 2.0 ** rng.uniform(-1.0, 1.0, TRUTH.freedoms()))
 
 
+@pytest.mark.slow
 def test_springs_and_compliances_at_other_postures_within_their_bands(exact):
     rng, springs, compliances, errors = np.random.default_rng(8), [], [], []
     true = _parameters(TRUTH)

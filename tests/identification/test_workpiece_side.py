@@ -96,6 +96,7 @@ def test_a_table_of_two_masses_comes_back(believed):
     assert side.yielding.keys() == {Dof.X}
 
 
+@pytest.mark.slow
 def test_it_is_known_as_well_as_it_says():
     """Over many campaigns: errors of one true mode in their standard deviations; delays and forces are off by theirs."""
     true = np.log([HZ * 640.0, 0.03, 9e6])

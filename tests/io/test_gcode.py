@@ -357,6 +357,7 @@ def same(found: ToolPath, told: ToolPath) -> None:
     assert found.tool.tolist() == told.tool.tolist()
 
 
+@pytest.mark.slow
 @given(rows=rows, tool=st.integers(0, 99))
 def test_a_written_program_is_read_back(rows, tool, tmp_path_factory):
     file = tmp_path_factory.mktemp("programs") / "P.nc"

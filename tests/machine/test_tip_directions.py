@@ -185,6 +185,7 @@ def face_mill():
     return Tooling("face mill", cutter, ToolAssembly(arbor[:1], arbor[1:], insertion=0.0))
 
 
+@pytest.mark.slow
 def test_limits_of_a_face_mill_take_the_slopes_of_the_chain():
     """Slopes raise them; the true machine's receptances, solved with all its freedoms, give the same."""
     spindle = read_machine(MACHINES / "hpm.toml").spindle
@@ -202,6 +203,7 @@ def test_limits_of_a_face_mill_take_the_slopes_of_the_chain():
     assert np.all(found > 1.1 * flat.limit_depth)
 
 
+@pytest.mark.slow
 def test_a_tap_of_another_tooling_or_sign_is_named():
     wrong = axial_flange_from_tap(in_a_row("ball", (*BALL, *HOLDER), 2), TAP, axial_tip(FACE, TAP))
     turned = axial_flange_from_tap(in_a_row("face", FACE, 1), TAP, -axial_tip(FACE, TAP))

@@ -52,6 +52,7 @@ def test_a_pass_is_usable_window_by_window(plain):
     assert str(found) == f"p: usable, {sum(a.omega.size for m in found.measurements for a in m.axes.values())} lines in 5 windows"
 
 
+@pytest.mark.slow
 def test_windows_show_the_machine_of_a_cut_at_constant_speed(plain):
     cut = plain.at_constant_speed()
     window = min(plain.measure().measurements, key=lambda each: abs(each.spindle_speed - CONSTANT))
@@ -61,6 +62,7 @@ def test_windows_show_the_machine_of_a_cut_at_constant_speed(plain):
     assert without > 1.5 * with_sweep
 
 
+@pytest.mark.slow
 def test_all_windows_share_one_angle(plain):
     # the delays, which tell where tooth 1 stood, are those of one turning spindle: the lines of all windows agree up to one angle
     found = plain.measure().measurements
@@ -76,6 +78,7 @@ def test_all_windows_share_one_angle(plain):
     assert all(not each.tooth_angle_known and each.clamping == "p" for each in found)
 
 
+@pytest.mark.slow
 def test_a_trigger_tells_the_angle():
     made = Pass(trigger=True)
     for each in made.measure().measurements:
@@ -87,6 +90,7 @@ def test_a_trigger_tells_the_angle():
         assert each.delay_std * each.spindle_speed < 0.02
 
 
+@pytest.mark.slow
 def test_a_speed_that_wanders_on_its_way_is_followed():
     steady, wandering = Pass(), Pass(wander=1e-3)
     noise = [np.sqrt(np.mean(each.measure().measurements[2].axes[Dof.Y].variance[:2])) for each in (steady, wandering)]
@@ -121,6 +125,7 @@ def test_an_air_cut_told_as_a_cut_is_left_out(plain):
     assert str(found.verdict.reasons[0]).startswith("5 of 5 windows are not usable")
 
 
+@pytest.mark.slow
 def test_a_speed_that_falls_shows_the_same_machine(plain):
     falling = Pass(speeds=SPEEDS[::-1])
     found = falling.measure()
@@ -181,6 +186,7 @@ def test_where_the_teeth_alone_tell_the_angle_it_is_said():
     np.testing.assert_allclose([each.spindle_speed / RPM for each in found.measurements], MIDDLES, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_an_air_cut_of_other_speeds_or_of_a_round_flange_is_no_air_cut(plain):
     for air in (Pass(speeds=(13000.0 * RPM, 14000.0 * RPM)).air, Pass(roundness=0.0).air):
         found = plain.measure(air=air)

@@ -134,6 +134,7 @@ def test_the_same_seed_draws_the_same_machines_whatever_the_speeds_are():
     np.testing.assert_array_equal(asked(tip, draws=80).drawn[:60], whole.drawn)
 
 
+@pytest.mark.slow
 def test_a_band_of_another_method_is_its_own():
     # of a tip that is known but for its scale the limits of all methods are in the same proportion
     tip = known_but_for_its_scale(0.1)

@@ -195,6 +195,7 @@ def test_bands_of_a_face_mill_end_where_its_edge_does():
         assert np.all(np.ptp(found.drawn, axis=0) > 0.0)
 
 
+@pytest.mark.witness
 @pytest.mark.slow
 def test_a_straight_serrated_edge():
     """Its waves do not open gradually: what full discretisation makes of it is what the march through time does."""

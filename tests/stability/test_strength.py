@@ -39,6 +39,7 @@ def stable(method: StabilityMethod, modes: TipModes, process: MillingProcess, sp
     return bool(stability_lobes(modes, harder, np.array([speed]), depth, method).stable[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pitch", [None, [100.0, 121.0, 139.0]], ids=["equal", "unequal"])
 @pytest.mark.parametrize("method", METHODS, ids=[each.name for each in METHODS])
 def test_a_little_stronger_chatters_and_a_little_weaker_does_not(method, pitch):
@@ -53,6 +54,7 @@ def test_a_little_stronger_chatters_and_a_little_weaker_does_not(method, pitch):
     assert 700.0 < found.chatter_frequency / (2.0 * np.pi) < 1500.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS[1:], ids=[each.name for each in METHODS[1:]])
 def test_whatever_a_similar_cut_bears(method):
     """Right, a little off, far off on either side, and beyond the ends."""

@@ -130,6 +130,7 @@ def test_lines_get_room_when_they_need_it():
     assert field.counts[2].max() == 5
 
 
+@pytest.mark.slow
 def test_leaning_tools_leave_no_ridges_along_the_lines():
     """Between the places into which a move is cut up nothing stays."""
     field = DexelField.block(np.zeros(3), HIGH, CELL)

@@ -76,6 +76,7 @@ def lines(values, angle, orders):
     return found[: orders.size] + 1j * found[orders.size : 2 * orders.size]
 
 
+@pytest.mark.witness
 @pytest.mark.slow
 @pytest.mark.parametrize("machine", ["written", "coupled"])
 def test_recordings_hold_the_true_cross_receptance(machine, request):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from api.client import Client
@@ -20,6 +21,7 @@ _OVERPRINTS = """() => {
 }"""
 
 
+@pytest.mark.witness
 def test_from_an_empty_page_to_a_best_speed(opened, client: Client, served: Served):
     """Three clicks; each view says the next one, and a tooling of before, last by its name, is not the one that is asked for."""
     client.write_tooling("VHM of before", by_hand.TOOLING)

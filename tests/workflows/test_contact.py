@@ -70,6 +70,7 @@ def three(seed):
     return calibrate_contact([tap(s, rng) for s in (0.05, 0.07, 0.09)])
 
 
+@pytest.mark.witness
 def test_three_stickouts_give_the_contact():
     """Stiffnesses to a percent, dampings to a few; deviations of the size that the covariance says; every parameter told."""
     z = []

@@ -64,6 +64,7 @@ def test_it_is_the_machine_at_the_recordings_speed():
     np.testing.assert_array_equal(there.estimate.force, found().estimate.force)
 
 
+@pytest.mark.witness
 @pytest.mark.parametrize("method", [Resonators(), PaperWalk()])
 def test_the_smoother_has_neither_lag_nor_loss(method):
     assert np.all(error(watch(method=method, smooth=True).estimate) < 0.03)

@@ -92,6 +92,7 @@ def test_each_speed_has_its_own_cross_terms():
     np.testing.assert_allclose(found, one_by_one, rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turning", [0, 1], ids=["oblique", "gyroscopic"])
 def test_maps_surfaces_and_advice_take_them_too(turning):
     machine = coupled_by_hand.machine(turning)

@@ -31,6 +31,8 @@ from tests.fixtures.paths import MACHINES
 
 RPM = np.pi / 30.0
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
@@ -76,7 +78,7 @@ def test_all_are_usable_and_windows_are_cuts_of_the_data(readings):
     assert clock_error(found) is None
 
 
-@pytest.mark.slow
+@pytest.mark.witness
 def test_the_machine_comes_out(readings):
     known, found = readings
     answer = identify(known, found, EvidenceSelection(), 1)

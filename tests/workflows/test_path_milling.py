@@ -52,6 +52,7 @@ def straight(change: ToolChange, depth: float, sides: tuple[float, float]) -> Pa
     return mill_path(change, path, field)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rpm", "engagement", "sides"),
     [
@@ -110,6 +111,7 @@ def slot(change: ToolChange, places: list[list[float]], low: list[float], **told
     return mill_path(change, path, field_of(TOOL, (np.array(low), np.array([0.04, 0.02, 0.0])), cell=0.5e-3))
 
 
+@pytest.mark.slow
 def test_lines_of_a_millimetre_chatter_as_one_of_forty_does() -> None:
     change = question(5000.0)
     depth = 1.6 * float(change.limits().limit_depth[0])
@@ -140,6 +142,7 @@ def test_a_thin_layer_deep_in_the_stock_pushes_as_one_on_top() -> None:
     assert two == pytest.approx(one, rel=0.01, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_fast_modes_get_as_many_instants_as_they_need() -> None:
     """4 kHz at 1500 rev/min are 160 periods a turn: at 360 instants a turn nothing of them would be seen."""
     modes = {axis: mode(axis, hz, kg) for axis, hz, kg in ((Dof.X, 4000.0, 0.0317), (Dof.Y, 4100.0, 0.0317))}

@@ -52,6 +52,7 @@ def test_what_is_recommended_holds_where_zero_order_limits_do_not():
     assert all(point.depth > 0.6 * point.limit for point in found.recommended)
 
 
+@pytest.mark.slow
 def test_a_lobe_between_the_speeds_of_the_limits_is_seen():
     """Two teeth at a tenth of the diameter: a lobe narrower than the steps of the limits takes 7 % of what they would let recommend."""
     rng = np.random.default_rng(50)
@@ -112,6 +113,7 @@ def test_a_cut_that_no_fitting_method_takes_is_not_recommended():
     assert any(remark.startswith("no cut is recommended: ") for remark in found.remarks)
 
 
+@pytest.mark.slow
 def test_advice_is_about_the_limits_that_are_shown():
     asked = ToolChange(by_hand.machine(), by_hand.tooling(), FED, np.linspace(600.0, 1500.0, 60), 5e-3, draws=20)
     drive = SpindleDrive.flat(power=5e3)
@@ -141,6 +143,7 @@ def test_advice_is_about_the_limits_that_are_shown():
     np.testing.assert_array_equal(found.common, found.lobes.limit_quantile(1.0))
 
 
+@pytest.mark.slow
 def test_how_deep_limits_are_looked_for_recommends_nothing_and_hides_no_speed():
     asked = ToolChange(by_hand.machine(), by_hand.tooling(), FED, np.linspace(600.0, 1500.0, 60), 50e-3, draws=0)
     whole = advise(asked)

@@ -68,6 +68,7 @@ def test_a_rigid_robot_is_told_from_one_that_gives_way_by_where_its_tool_is() ->
     assert found.tip[steady].mean(axis=0)[:2] == pytest.approx([4.1e-6, 27.9e-6], abs=2e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", [ALONG_X, None])
 def test_play_changes_the_forces_the_published_way(direction: np.ndarray | None) -> None:
     """Larger extremes, a larger mean along the feed, a smaller one across it."""
@@ -80,6 +81,7 @@ def test_play_changes_the_forces_the_published_way(direction: np.ndarray | None)
     assert abs(loose[5]) < abs(tight[5])
 
 
+@pytest.mark.slow
 def test_what_the_control_takes_out_of_the_weight_leaves_the_forces() -> None:
     robot = arm(False)
     turn = feed_turn(robot, POSTURE, ALONG_X)
@@ -91,6 +93,7 @@ def test_what_the_control_takes_out_of_the_weight_leaves_the_forces() -> None:
     assert (*with_weight[2:4], *with_weight[5:]) == pytest.approx((*without[2:4], *without[5:]), rel=0.01)
 
 
+@pytest.mark.slow
 def test_steel_chatters_and_dampers_ten_times_as_strong_calm_it() -> None:
     """What the tip does beside what repeats every turn, in the second half of the pass."""
     robot = arm(False)
@@ -108,6 +111,7 @@ def test_steel_chatters_and_dampers_ten_times_as_strong_calm_it() -> None:
     assert calm < 0.1 * wild
 
 
+@pytest.mark.slow
 def test_a_march_of_its_own_on_its_own_multibody_agrees() -> None:
     """The virtual machine's march: Kane's mass matrix, exact poles, chips from delays between fixed angles. At a quarter of the feed."""
     robot, feed = arm(True), 0.25 * 3.7 / 60.0 / (2.0 * 18700.0 / 60.0)

@@ -269,6 +269,7 @@ def shaped(shape="flat", corner=0.0):
     return replace(tooling, cutter=replace(tooling.cutter, shape=shape, corner_radius=corner))
 
 
+@pytest.mark.slow
 def test_a_cutter_that_is_no_cylinder_is_said_with_every_answer():
     told = "computed as a cylinder: the cutter's shape is ball; its stability limits were 0.80 to 1.07 times the true ones in a slot"
     for softening in (False, True):
@@ -279,6 +280,7 @@ def test_a_cutter_that_is_no_cylinder_is_said_with_every_answer():
         assert [sum(remark.startswith(told) for remark in remarks) for remarks in answers[1]] == [1, 1]
 
 
+@pytest.mark.slow
 def test_a_corner_radius_is_said_where_limits_are_shallow():
     """A tooltip knows no depth; limits of a machine that changes with speed say it once for all its blocks."""
     machine = one_axis(softening=True)

@@ -100,6 +100,7 @@ class Doubted(TurningMachine):
         return (FlangePart(FLANGE, JointedFlange(self.modes, self.joint), doubt),)
 
 
+@pytest.mark.slow
 def test_bands_over_speed():
     """All blocks draw at the same frequencies; each one's own ones tell the same, at the anchors but for the interpolation."""
     own = turning_machine()

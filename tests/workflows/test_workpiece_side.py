@@ -115,6 +115,7 @@ def test_a_tooltip_is_the_tools_own_unless_it_is_asked_for_relative():
 TABLE = VirtualWorkpieceSide((SideMode(HZ * 640.0, 0.025, 3.5e6),), (SideMode(HZ * 800.0, 0.03, 4e6),))
 
 
+@pytest.mark.witness
 @pytest.mark.slow
 def test_from_recordings_to_limits(tmp_path, monkeypatch):
     """Two toolings on a table that gives way: its modes within what is told of them, the spindle's side the same to the last bit as without

@@ -161,6 +161,7 @@ def apart(campaign):
     return last.score, last.oblique, last.gyroscopic
 
 
+@pytest.mark.witness
 @pytest.mark.slow
 def test_kinds_of_coupling_are_told_apart(skewed, turning):
     score, out_of_axes, moments = apart(skewed)
