@@ -30,6 +30,8 @@ CURVES = {
     "flip": "flip",
 }
 
+pytestmark = pytest.mark.slow
+
 
 def run(*arguments):
     result = CliRunner().invoke(app, [str(a) for a in arguments])
@@ -97,7 +99,7 @@ def same(one, other, rel=1e-6):
         assert one == other
 
 
-@pytest.mark.slow
+@pytest.mark.witness
 def test_limit_recommendation_and_speeds_are_the_same_at_every_door(command, rest, page):
     by_command, by_rest = command[0], rest[0]
     keys = set(lobes_summary(page.advice))
@@ -139,7 +141,6 @@ def test_advice_and_lobes_recommend_the_same_where_the_spindle_has_enough(comman
         assert point["axial_depth_mm"] == point["recommended_depth_mm"] < point["limit_depth_mm"]
 
 
-@pytest.mark.slow
 def test_console_and_report_show_these_numbers(folder, command, page):
     found = by_hand.identification()
     html = re.sub(r"\s+", " ", report_html(found, by_hand.campaign(folder), [], [page], {}, {}))

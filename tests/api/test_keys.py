@@ -121,6 +121,7 @@ def test_every_call_is_in_the_list(http):
     assert sorted(operations) == sorted(listed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "path", "body", "scope"), CALLS, ids=lambda v: str(v)[:30])
 def test_a_call_needs_a_key_with_its_scope(guarded_http, method, path, body, scope):
     http, keys = guarded_http

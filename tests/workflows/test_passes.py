@@ -78,7 +78,6 @@ def test_all_are_usable_and_windows_are_cuts_of_the_data(readings):
     assert clock_error(found) is None
 
 
-@pytest.mark.witness
 def test_the_machine_comes_out(readings):
     known, found = readings
     answer = identify(known, found, EvidenceSelection(), 1)

@@ -112,6 +112,7 @@ def test_steel_chatters_and_dampers_ten_times_as_strong_calm_it() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.witness
 def test_a_march_of_its_own_on_its_own_multibody_agrees() -> None:
     """The virtual machine's march: Kane's mass matrix, exact poles, chips from delays between fixed angles. At a quarter of the feed."""
     robot, feed = arm(True), 0.25 * 3.7 / 60.0 / (2.0 * 18700.0 / 60.0)

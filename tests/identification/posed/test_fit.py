@@ -80,7 +80,6 @@ def test_lines_are_those_of_the_coupled_robot(data, arm, cuts):
             np.testing.assert_allclose(lines[i][own, 0], expected, rtol=1e-6)
 
 
-@pytest.mark.witness
 def test_springs_and_tips_elsewhere(told, cuts):
     answer, _, posterior = told
     # what swings on for long after a slow cut's beginning may contradict the others
