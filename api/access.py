@@ -17,7 +17,7 @@ from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from api.components import Components
 from api.log_lines import tell
-from api.problems import Problem, document
+from api.problems import Problem, document, of_disk
 from api.stores.entities import Destroyed, Unavailable
 from api.work.pool import Busy
 
@@ -179,4 +179,4 @@ def _problem(error: Exception) -> Problem:
         return Problem(503, "the database does not answer", headers=RETRY)
     if isinstance(error, Busy):
         return Problem(503, "too many queries are waiting for an answer", headers=RETRY)
-    return Problem(500, "an internal error occurred; it is logged under this request's id")
+    return of_disk(error) or Problem(500, "an internal error occurred; it is logged under this request's id")
