@@ -54,6 +54,9 @@ class AccessMonitor:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 extra = [(b"x-request-id", id.encode()), (b"x-content-type-options", b"nosniff")]
+                if not any(name.lower() == b"cache-control" for name, _ in message.get("headers", [])):
+                    # answers hold what belongs to a group: neither a proxy nor a browser keeps them
+                    extra.append((b"cache-control", b"no-store"))
                 if scope["scheme"] == "https":
                     extra.append((b"strict-transport-security", b"max-age=31536000"))
                 if not body.read:

@@ -66,9 +66,7 @@ async def head(id: CampaignId, name: RecordingName, components: ThisService, cal
     state = await state_of(components, campaign, name)
     if state is None:
         raise Problem(404, "no part of this recording has been uploaded")
-    return Response(
-        status_code=204, headers={"Upload-Offset": str(state.offset), "Upload-Length": str(state.length), "Cache-Control": "no-store"}
-    )
+    return Response(status_code=204, headers={"Upload-Offset": str(state.offset), "Upload-Length": str(state.length)})
 
 
 @router.patch(

@@ -166,8 +166,7 @@ async def state(id: CampaignId, name: RecordingName, components: ThisService, ca
     found = await state_of(components, campaign, name)
     if found is None:
         raise Problem(404, "no such upload has begun")
-    told = {"Upload-Offset": str(found.offset), "Upload-Length": str(found.length), "Cache-Control": "no-store"}
-    return Response(status_code=204, headers=told)
+    return Response(status_code=204, headers={"Upload-Offset": str(found.offset), "Upload-Length": str(found.length)})
 
 
 @router.patch(
