@@ -17,7 +17,7 @@ from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from api.components import Components
 from api.log_lines import tell
-from api.problems import Problem, document
+from api.problems import Problem, document, of_disk
 from api.stores.entities import Destroyed, Unavailable
 from api.work.pool import Busy
 
@@ -54,6 +54,9 @@ class AccessMonitor:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 extra = [(b"x-request-id", id.encode()), (b"x-content-type-options", b"nosniff")]
+                if not any(name.lower() == b"cache-control" for name, _ in message.get("headers", [])):
+                    # answers hold what belongs to a group: neither a proxy nor a browser keeps them
+                    extra.append((b"cache-control", b"no-store"))
                 if scope["scheme"] == "https":
                     extra.append((b"strict-transport-security", b"max-age=31536000"))
                 if not body.read:
@@ -179,4 +182,4 @@ def _problem(error: Exception) -> Problem:
         return Problem(503, "the database does not answer", headers=RETRY)
     if isinstance(error, Busy):
         return Problem(503, "too many queries are waiting for an answer", headers=RETRY)
-    return Problem(500, "an internal error occurred; it is logged under this request's id")
+    return of_disk(error) or Problem(500, "an internal error occurred; it is logged under this request's id")

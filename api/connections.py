@@ -11,11 +11,14 @@ from contextlib import ExitStack
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.exceptions import ProtocolError
 from websockets.frames import Frame
 
 log = logging.getLogger("rcsa_ident.service")
 #: Size of a first message, after which the client is known [bytes], and interval between two lines about refused connections [s].
 FIRST_MESSAGE, TELL = 600_000, 60.0
+#: Fragments of a message: browsers send one of 16 MB in a few hundred.
+MOST_FRAGMENTS = 1000
 
 
 def network_of(address: str) -> str:
@@ -114,17 +117,24 @@ def listeners(host: str, port: int, counted: Connections) -> list[socket.socket]
 
 
 class SmallHelloProtocol(WebSocketsSansIOProtocol):
-    """WebSocket whose first message is small: before it nobody knows who sends it."""
+    """WebSocket whose first message is small: before it nobody knows who sends it. No message comes in very many fragments."""
 
     def __init__(self, *arguments: Any, **further: Any) -> None:
         super().__init__(*arguments, **further)
         self.conn.max_message_size, take = FIRST_MESSAGE, self.conn.recv_frame
+        fragments = 0
 
-        def first(frame: Frame) -> None:
+        def counted(frame: Frame) -> None:
+            nonlocal fragments
             take(frame)
-            if frame.fin and frame.opcode in (0, 1, 2):
+            if frame.opcode not in (0, 1, 2):
+                return
+            fragments = 0 if frame.fin else fragments + 1
+            if fragments > MOST_FRAGMENTS:
+                # each takes memory of its own, however few bytes it brings
+                raise ProtocolError(f"a message of more than {MOST_FRAGMENTS} fragments")
+            if frame.fin:
                 # the end of a message; the rest of what has come with it is already read within the wider limit
                 self.conn.max_message_size = self.config.ws_max_size
-                self.conn.recv_frame = take  # type: ignore[method-assign]
 
-        self.conn.recv_frame = first  # type: ignore[method-assign]
+        self.conn.recv_frame = counted  # type: ignore[method-assign]

@@ -38,6 +38,7 @@ _WHY = {
     404: "It does not exist, or belongs to another group.",
     408: "The body arrives too slowly.",
     409: "The name, or the idempotency key with another body, is already in use.",
+    410: "Another request has given the upload up meanwhile; none of its bytes is kept.",
     412: "The stored content does not match If-Match or If-None-Match.",
     413: "The body is too large, or the group has no room left for it.",
     415: "The body is of another type.",
@@ -46,7 +47,7 @@ _WHY = {
     429: "There are too many requests with this API key.",
     460: "The bytes of the part do not have the announced checksum; none of them is kept.",
     500: "What is stored is damaged; the sentence says how it becomes whole again.",
-    503: "Too many queries are waiting for an answer, or the database does not answer.",
+    503: "Too many queries are waiting for an answer, the database does not answer, or the disk is full.",
 }
 _ALWAYS = (401, 403, 429, 503)
 #: Statuses of routes with a body.

@@ -1,7 +1,8 @@
 """Files of uploads: written once, named by the hash of their content, never by a client.
 
-A group has a folder of its own. What arrives goes to a part; a part that is complete is synced and takes its place under the hash
-of its content by one rename, so that a file that is there is whole. A row of the store refers to a file only after that.
+A group has a folder of its own. What arrives goes to a part; a part that is complete is synced and gets a second name, the hash of its
+content, by one rename, so that a file that is there is whole. A row of the store refers to a file only after that, and only then does
+the part lose its own name.
 """
 
 from __future__ import annotations
@@ -82,20 +83,23 @@ class Part:
     def __init__(self, path: Path, offset: int = 0) -> None:
         self.path, self.size = path, offset
         self.hash: Any = hashlib.sha256() if offset == 0 else None
-        self.file = path.open("r+b" if path.exists() else "xb")
+        # without a buffer: what does not fit on the disk is written by nobody later on
+        self.file = path.open("r+b" if path.exists() else "xb", buffering=0)
         self.file.truncate(offset)
         self.file.seek(offset)
 
     def write(self, data: bytes | bytearray) -> None:
-        """Append."""
-        self.file.write(data)
-        self.size += len(data)
-        if self.hash is not None:
-            self.hash.update(data)
+        """Append; `size` counts what the disk has taken, also where it is full before the end."""
+        left = memoryview(data)
+        while left:
+            taken = self.file.write(left)
+            self.size += taken
+            if self.hash is not None:
+                self.hash.update(left[:taken])
+            left = left[taken:]
 
     def sync(self) -> None:
         """Return when everything written is on the disk."""
-        self.file.flush()
         os.fsync(self.file.fileno())
 
     def close(self) -> None:
@@ -110,7 +114,6 @@ class Part:
     def sha256(self) -> str:
         """Return the hash of the whole, hexadecimal."""
         if self.hash is None:
-            self.file.flush()
             return sha256_of(self.path)
         return str(self.hash.hexdigest())
 
@@ -182,7 +185,7 @@ class Files:
         used = sum(self.usage(group).values())
         if used + more > self.group_bytes:
             raise TooLarge(f"the group keeps {used} bytes, and may keep {self.group_bytes}")
-        if shutil.disk_usage(self.of_group(group, PARTS)).free - more < self.free_bytes:
+        if is_short(self.of_group(group, PARTS), self.free_bytes + more):
             raise Full
 
     def usage(self, group: str) -> dict[str, int]:
@@ -199,9 +202,17 @@ class Files:
         return sum(found.values())
 
     def keep(self, group: str, kind: str, key: str, source: Path) -> None:
-        """Rename a synced part to its final name, replacing an equal file. The caller holds `lock`."""
-        target = self.path(group, kind, key)
-        os.replace(source, target)
+        """Give a synced part its final name beside its own, replacing an equal file. The caller holds `lock`.
+
+        The part keeps its own until a row refers to the file: where none can be written, nothing that was acknowledged is lost.
+        """
+        target, new = self.path(group, kind, key), self.spare(group)
+        try:
+            _link(source, new)
+            os.replace(new, target)
+        finally:
+            # of two names of one file neither takes the other's place
+            new.unlink(missing_ok=True)
         # a whole file may take the place of a damaged one
         self.sizes.get(target.parent, {}).pop(target.name, None)
         sync_folder(target.parent)
@@ -276,9 +287,30 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def is_short(folder: Path, least: int) -> bool:
+    """Whether a disk has fewer free bytes than these, or no room for another file."""
+    if shutil.disk_usage(folder).free < least:
+        return True
+    # Windows counts no files; where this number is 0 neither does the file system
+    counted = os.statvfs(folder) if hasattr(os, "statvfs") else None
+    return counted is not None and counted.f_files > 0 and counted.f_favail == 0
+
+
 def no_room(error: BaseException) -> bool:
     """Whether an error says that a disk, or a quota on it, is full."""
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give a synced file a second name, or copy and sync it where its file system has no such thing."""
+    try:
+        os.link(source, target)
+    except (AttributeError, OSError) as error:
+        if no_room(error) or isinstance(error, FileNotFoundError):
+            raise
+        shutil.copyfile(source, target)
+        with target.open("rb+") as copied:
+            os.fsync(copied.fileno())
 
 
 def _size(path: Path) -> int:

@@ -103,7 +103,9 @@ def create_app(
     workers = Pool(settings.workers, settings.queue, settings.kept_machines, most, several) if work is None else work
     files = Files(settings.data / "files", settings.group_bytes, settings.free_bytes)
     limits = Limits(settings.reader_memory, settings.reader_seconds, settings.reader_wall_seconds, settings.reader_calls)
-    readers = Reader(limits, 2 * settings.uploads, folder=files.folder / "reading") if reader is None else reader
+    readers = (
+        Reader(limits, 2 * settings.uploads, folder=files.folder / "reading", free_bytes=settings.free_bytes) if reader is None else reader
+    )
     uploads = Uploads(kept, files, readers, Shares(settings.uploads, several))
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
     feeds = EventFeeds(kept.jobs, Shares(settings.watchers, several))

@@ -13,6 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
+from api.files import Full, no_room
 from api.stores.entities import Damaged, NoRoom
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.validated_table import describe
@@ -93,6 +94,14 @@ def of_room(error: NoRoom) -> Problem:
         "delete machines or campaigns that nobody needs any more (GET /v1/usage tells what takes the room)"
     )
     return Problem(413, detail, [_entry("group", f"{error.used} bytes", f"{error.allowed} bytes")])
+
+
+def of_disk(error: Exception) -> Problem | None:
+    """Return the problem of a disk that has too little room, None where an error says nothing of it."""
+    if not (isinstance(error, Full) or no_room(error)):
+        return None
+    words = "the disk has too little free space left" if isinstance(error, Full) else "the disk is full"
+    return Problem(503, words, headers={"Retry-After": "600"})
 
 
 def of_validation(errors: Sequence[Any]) -> Problem:

@@ -42,8 +42,8 @@ PREFIX = "ri"
 LONGEST, USED = 3650, 60.0
 #: Wrong keys of an address that are answered at once: each minute, and in a burst.
 WRONG_KEYS = (20, 20)
-#: What a proxy adds to a request that it passes on, beside X-Forwarded-…
-_PASSED_ON = ("forwarded", "x-real-ip", "via")
+#: What a proxy adds to a request that it passes on: its own name, or where the request comes from, as X-Forwarded-For or CF-Connecting-IP.
+_PASSED_ON = re.compile(r"via|.*forwarded.*|.*(client|connecting|real|remote|source|external)[-_]?(ip|ipv6|addr|address)")
 _LOCAL_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 
 
@@ -134,7 +134,7 @@ def caller_of(request: HTTPConnection, components: Components, given: str | None
     """
     text = request.headers.get(HEADER, "") or given or ""
     if not text and not components.settings.asks_for_keys:
-        _check_local(request)
+        check_local(request)
         return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES, LOCAL_KEY)
     _, _, rest = text.partition("_")
     id, _, secret = rest.partition("_")
@@ -171,15 +171,15 @@ def _expired(key: Key) -> bool:
     return key.expires is not None and key.expires <= now()
 
 
-def _check_local(request: HTTPConnection) -> None:
+def check_local(request: HTTPConnection) -> None:
     """Refuse what does not come from this machine itself, where no key is required."""
     # DNS rebinding: a foreign page may reach loopback through a host name of its own
     if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
         raise Problem(403, "without an API key the service answers on localhost only")
     # a browser sends a form anywhere without asking
-    if is_foreign(request):
+    if is_foreign(request) or request.headers.get("sec-fetch-site", "").lower() == "cross-site":
         raise Problem(403, "without an API key the service answers no pages of another origin")
-    passed_on = next((name for name in request.headers if name in _PASSED_ON or name.startswith("x-forwarded-")), None)
+    passed_on = next((name for name in request.headers if _PASSED_ON.fullmatch(name)), None)
     if passed_on is not None:
         raise Problem(403, f"without an API key the service answers nothing that a proxy has passed on (found the header {passed_on})")
 

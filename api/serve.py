@@ -13,7 +13,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, no_cache
 from rcsa_ident.remarks import counted
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help="The web service; settings come from RCSA_IDENT_... too.")
@@ -103,6 +103,8 @@ def worker(
     import signal
     import threading
 
+    # kernels that can be kept nowhere are refused here, once, not by every child
+    import rcsa_ident.dynamics.poles  # noqa: F401
     from api import log_lines
     from api.jobs.supervisor import Supervisor
 
@@ -252,4 +254,11 @@ def _fail(error: InputError) -> NoReturn:
 
 def main() -> None:
     """Run the command."""
-    app()
+    try:
+        app()
+    except RuntimeError as error:
+        refused = no_cache(error)
+        if refused is None:
+            raise
+        typer.echo(f"error: {refused}", err=True)
+        raise SystemExit(2) from None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 
 class RcsaIdentError(Exception):
     """Base of every error that this package raises on purpose."""
@@ -53,6 +55,14 @@ class InputError(RcsaIdentError, ValueError):
         TOOL.toml: teeth: found 0, allowed is 1 or more
         """
         return type(self)(self.field, self.found, self.allowed, where)
+
+
+def no_cache(error: RuntimeError) -> InputError | None:
+    """Return in words that compiled kernels can be kept nowhere, as numba raises it at an import; None for any other error."""
+    if "no locator available" not in str(error):
+        return None
+    found = os.environ.get("NUMBA_CACHE_DIR") or "nothing, while this package's folder and the user's cache cannot be written"
+    return InputError("NUMBA_CACHE_DIR", found, "a folder that can be written, where compiled kernels are kept")
 
 
 class Unsteady(InputError):

@@ -194,7 +194,7 @@ async def events(components: Components, caller: Caller, id: str, kind: str, see
         finally:
             watching.__exit__(None, None, None)
 
-    return EventSourceResponse(stream(), headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
+    return EventSourceResponse(stream(), headers={"X-Accel-Buffering": "no"})
 
 
 def longest(components: Components, job: Job) -> float:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from api.confinement import Confinement, confine
-from api.files import Full, no_room
+from api.files import Full, is_short, no_room
 from api.log_lines import ids, telling
 from api.processes import Child, follow_parent, limit, limit_memory, spawn_context
 from api.reading import reader_tasks
@@ -31,6 +31,8 @@ from rcsa_ident.errors import InputError
 log = logging.getLogger("rcsa_ident.reading")
 #: Time limit for the start of the process, including imports and compilation [s].
 _START = 300.0
+#: Free space [bytes] that a library may ask for at once: below it, what fails says nothing about the file.
+_LEAST = 16 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +75,20 @@ class Reader:
         Called first in the process, without limits.
     folder : Path, optional
         On the disk of the uploads, for the files of a call; nothing else is in it.
+    free_bytes : int
+        That uploads leave free there.
     """
 
-    def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm, folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        queue: int,
+        prepare: Callable[[], None] = reader_tasks.warm,
+        folder: Path | None = None,
+        free_bytes: int = 0,
+    ) -> None:
         self.limits, self.queue, self.prepare, self.folder, self.waiting = limits, queue, prepare, folder, 0
+        self.least = max(free_bytes, _LEAST)
         self.threads: FairThreads | None = None
         self.child: _Reading | None = None
 
@@ -85,13 +97,14 @@ class Reader:
             # rooms of a service that was killed hold on to files that may be deleted since
             shutil.rmtree(self.folder, ignore_errors=True)
         self.threads = FairThreads(1, "reader")
-        self.child = child = self._new()
-        # what holds is said at the service's start, not at its first upload
-        self.threads.submit(child.greet)
+        self._replace()
+        if self.child is not None:
+            # what holds is said at the service's start, not at its first upload
+            self.threads.submit(self.child.greet)
 
     @property
     def ready(self) -> bool:
-        return self.child is not None
+        return self.threads is not None
 
     async def run(self, call: Callable[..., Any], *arguments: Any) -> Any:
         if self.threads is None or self.waiting > self.queue:
@@ -109,7 +122,7 @@ class Reader:
                 break
             self.child = child = self.child or self._new()
             kind, answer = child.ask(call, arguments)
-            if kind in ("costly", "killed") or child.calls >= self.limits.calls:
+            if child.ended or child.calls >= self.limits.calls:
                 self._replace()
             if kind == "answer":
                 return answer
@@ -125,12 +138,16 @@ class Reader:
         raise Busy
 
     def _new(self) -> _Reading:
-        return _Reading(self.limits, self.prepare, Room(self.folder))
+        return _Reading(self.limits, self.prepare, Room(self.folder), self.least)
 
     def _replace(self) -> None:
-        if self.child is not None:
-            self.child.end()
-        self.child = None if self.threads is None else self._new()
+        child, self.child = self.child, None
+        if child is not None:
+            child.end()
+        if self.threads is not None:
+            # where the disk has no room for another one, the next call tries again, and says so
+            with contextlib.suppress(OSError):
+                self.child = self._new()
 
     def stop(self) -> None:
         threads, self.threads = self.threads, None
@@ -147,8 +164,8 @@ class Reader:
 class _Reading:
     """One reader process, the pipe to it and its room."""
 
-    def __init__(self, limits: Limits, prepare: Callable[[], None], room: Room) -> None:
-        self.limits, self.room, self.calls, self.ready = limits, room, 0, False
+    def __init__(self, limits: Limits, prepare: Callable[[], None], room: Room, least: int) -> None:
+        self.limits, self.room, self.least, self.calls, self.ready, self.ended = limits, room, least, 0, False, False
         self.pipe, theirs = spawn_context().Pipe()
         self.process = Child(_serve, theirs, limits, prepare, room, name="reader", follows=False)
         theirs.close()
@@ -156,23 +173,41 @@ class _Reading:
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
         """Return the outcome of a call (answer, refused, failed, costly, full disk, or killed from outside) and its content."""
         try:
-            self._until_ready()
-            self.calls += 1
-            self.pipe.send((call, self.room.take_in(arguments), ids()))
-            kind, answer = self._receive(self.limits.wall_seconds)
-            self.room.give_out()
-        except TimeoutError:
-            self.process.kill()
-            return "costly", None
-        except BrokenPipeError:
-            # it ended before this call
-            return "killed", None
-        except (EOFError, OSError):
-            self.process.join(10.0)
-            return "killed" if self.process.killed or not self.ready else "costly", None
+            kind, answer = self._outcome(call, self.room.take_in(arguments))
+            if kind == "answer":
+                self.room.give_out()
+            elif is_short(self.room.folder, self.least):
+                # libraries fail in many ways where they cannot write, and some end the process
+                return "full", None
+            return kind, answer
+        except OSError as error:
+            if not no_room(error):
+                raise
+            return "full", None
         finally:
             self.room.clear()
-        return kind, answer
+
+    def _outcome(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+        """Ask the process; `ended` is set where it answers no further call."""
+        try:
+            self._until_ready()
+            self.calls += 1
+            self.pipe.send((call, arguments, ids()))
+            kind, answer = self._receive(self.limits.wall_seconds)
+            return kind, answer
+        except TimeoutError:
+            self.ended = True
+            self.process.kill()
+            # a slow start says nothing about the upload
+            return "costly" if self.ready else "killed", None
+        except BrokenPipeError:
+            # it ended before this call
+            self.ended = True
+            return "killed", None
+        except (EOFError, OSError):
+            self.ended = True
+            self.process.join(10.0)
+            return "killed" if self.process.killed or not self.ready else "costly", None
 
     def greet(self) -> None:
         """Wait until the process is ready, and say what holds in it."""

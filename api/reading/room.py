@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ class Room:
         self.given.mkdir()
         self.made.mkdir()
         self.wanted: dict[Path, Path] = {}
+        self.linked = 0
 
     def take_in(self, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return the arguments of a call with every file, and every place for one, as the process sees it."""
@@ -44,6 +46,7 @@ class Room:
     def clear(self) -> None:
         """Leave nothing of a call to the next one."""
         self.wanted.clear()
+        self.linked = 0
         for folder in (self.given, self.made):
             for path in folder.iterdir():
                 path.unlink(missing_ok=True)
@@ -60,10 +63,13 @@ class Room:
         return self._linked(argument) if isinstance(argument, Path) else argument
 
     def _linked(self, path: Path) -> Path:
-        link = self.given / f"{len(list(self.given.iterdir()))}{path.suffix}"
-        try:
-            os.link(path, link)
-        except (AttributeError, OSError):
-            # a system, a file system or another disk without hard links; what is not there is missed again
-            shutil.copyfile(path, link)
+        link = self.given / f"{self.linked}{path.suffix}"
+        self.linked += 1
+        # what was deleted meanwhile is missed by whoever reads it
+        with suppress(FileNotFoundError):
+            try:
+                os.link(path, link)
+            except (AttributeError, OSError):
+                # a system, a file system or another disk without hard links
+                shutil.copyfile(path, link)
         return link

@@ -6,6 +6,7 @@ is to the last bit what the commands read from the upload. Chunks of a second le
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Iterator, Sequence
@@ -28,23 +29,51 @@ from rcsa_ident.signals.recording import BLOCK, Quantity, Recording, Sensor
 from rcsa_ident.signals.verdict import RecordCode
 
 _SENSORS, _NOTES = "sensors", "notes"
+#: Most that HDF5 writes beside samples [bytes]: for a chunk, for a dataset, and for a file with its attributes.
+_OF_A_CHUNK, _OF_A_DATASET, _OF_A_FILE = 64, 8192, 1 << 17
 
 
 def write_normalised(path: Path, rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> None:
-    """Write the signals of sensors, shape (n,) each, block by block, and sync them to the disk."""
+    """Write the signals of sensors, shape (n,) each, block by block, and sync them to the disk.
+
+    Raises
+    ------
+    OSError
+        The disk is full: known before the first sample is written, since HDF5 may end the process where a write fails.
+    """
+    kinds = [np.dtype(np.float32 if all(_single(block) for _, block in _blocks_of(signal)) else np.float64) for signal in signals]
+    chunks = [int(min(max(rate, 1.0), LARGEST_CHUNK // 8, signal.size)) for signal in signals]
     with h5py.File(path, "w") as file:
+        _reserve(path, sum(_stored(signal.size, chunk, kind) for signal, chunk, kind in zip(signals, chunks, kinds, strict=True)))
         file.attrs[RATE] = float(rate)
         file.attrs[_SENSORS] = json.dumps([asdict(sensor) for sensor in sensors])
         file.attrs[_NOTES] = json.dumps([(note.code, str(note)) for note in notes_of(signals)])
-        for i, signal in enumerate(signals):
-            kind = np.float32 if all(_single(block) for _, block in _blocks_of(signal)) else np.float64
-            chunk = int(min(max(rate, 1.0), LARGEST_CHUNK // 8, signal.size))
+        for i, (signal, chunk, kind) in enumerate(zip(signals, chunks, kinds, strict=True)):
             # a channel's name may not be valid in HDF5
             dataset = file.create_dataset(f"{i}", (signal.size,), kind, chunks=(chunk,), fletcher32=True, track_times=False)
             for start, block in _blocks_of(signal):
                 dataset[start : start + block.size] = block.astype(kind, copy=False)
+        file.flush()
+        length = file.id.get_filesize()
     with path.open("rb+") as written:
+        written.truncate(length)
         os.fsync(written.fileno())
+
+
+def _stored(samples: int, chunk: int, kind: np.dtype[Any]) -> int:
+    """Bytes that a dataset takes at most: each of its chunks is whole, and has a checksum and a place in the index."""
+    return -(-samples // chunk) * (chunk * kind.itemsize + _OF_A_CHUNK) + _OF_A_DATASET
+
+
+def _reserve(path: Path, size: int) -> None:
+    """Have a file's bytes allocated, where system and file system can; raises `OSError` where the disk has no room for them."""
+    if hasattr(os, "posix_fallocate"):
+        with path.open("rb+") as file:
+            try:
+                os.posix_fallocate(file.fileno(), 0, _OF_A_FILE + size)
+            except OSError as error:
+                if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                    raise
 
 
 def _blocks_of(signal: Channel) -> Iterator[tuple[int, FloatArray]]:

@@ -55,7 +55,9 @@ class Uploads:
 
     def __init__(self, store: Store, files: Files, reader: Work, places: Shares) -> None:
         self.store, self.files, self.reader, self.places = store, files, reader, places
+        #: Resumable uploads that a request writes, and those of them that another has given up meanwhile.
         self.writing: set[tuple[str, str]] = set()
+        self.given_up: set[tuple[str, str]] = set()
         self.settling: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
 
     @contextmanager
@@ -67,6 +69,19 @@ class Uploads:
             yield
         finally:
             self.places.give(group)
+
+    @contextmanager
+    def alone(self, campaign: str, name: str) -> Iterator[None]:
+        """Write a resumable upload; raises `Busy` where another request does."""
+        key = (campaign, name)
+        if key in self.writing:
+            raise Busy
+        self.writing.add(key)
+        try:
+            yield
+        finally:
+            self.writing.discard(key)
+            self.given_up.discard(key)
 
     async def take(self, campaign: Campaign, name: str, received: Received, replacing: bool = False) -> tuple[int, Recording]:
         """Store a file as a recording of the campaign; return 201, or 200 where it existed already, and the recording.
@@ -104,25 +119,23 @@ class Uploads:
         Taken, InputError
             As `take`.
         """
-        key = (state.campaign, state.name)
-        if key in self.writing:
-            raise Busy
-        self.writing.add(key)
-        try:
-            campaign = await asyncio.to_thread(self.store.campaigns.get, state.group, state.campaign)
-            if campaign is not None and state.name in files_of(campaign.text):
-                whole = await asyncio.to_thread(received, path)
-                if state.sha256 not in ("", whole.sha256):
-                    raise InputError("Upload-Metadata", f"content with the SHA-256 {whole.sha256}", state.sha256)
-                with suppress(KeyError):
-                    # else the campaign has gone meanwhile
-                    await self.take(campaign, state.name, whole, state.replacing)
+        with self.alone(state.campaign, state.name):
+            try:
+                campaign = await asyncio.to_thread(self.store.campaigns.get, state.group, state.campaign)
+                if campaign is not None and state.name in files_of(campaign.text):
+                    whole = await asyncio.to_thread(received, path)
+                    if state.sha256 not in ("", whole.sha256):
+                        raise InputError("Upload-Metadata", f"content with the SHA-256 {whole.sha256}", state.sha256)
+                    with suppress(KeyError):
+                        # else the campaign has gone meanwhile
+                        await self.take(campaign, state.name, whole, state.replacing)
+            except (InputError, FileNotFoundError) as error:
+                if (state.campaign, state.name) in self.given_up:
+                    return
+                if isinstance(error, InputError):
+                    await asyncio.to_thread(self.files.forget, path)
+                raise
             await asyncio.to_thread(self.files.forget, path)
-        except InputError:
-            await asyncio.to_thread(self.files.forget, path)
-            raise
-        finally:
-            self.writing.discard(key)
 
     async def _finish_all(self) -> None:
         """Store what a crash, or a full disk, has left complete but not stored."""
@@ -175,6 +188,7 @@ class Uploads:
             except (Taken, NoRoom, KeyError):
                 self._release(group, files_named(recording))
                 raise
+            upload.unlink(missing_ok=True)
             if before is not None:
                 self._release(group, {*files_named(before), *files_named(recording)})
             return before
@@ -248,17 +262,25 @@ class Uploads:
         after = replace(recording, found=text, judged_with="" if air is None else air.normalised)
         await asyncio.to_thread(self.store.recordings.judge, recording, after)
 
+    def give_up(self, group: str, campaign: str, name: str) -> bool:
+        """Remove a resumable upload, also one that is being written, and return whether there was one. The caller holds the lock."""
+        path, state = self.files.partial(group, partial_name(campaign, name))
+        self.files.forget(path)
+        written = (campaign, name) in self.writing
+        if written:
+            self.given_up.add((campaign, name))
+        return written or state is not None
+
     async def forget(self, campaign: Campaign, name: str) -> bool:
         """Remove a recording or its unfinished upload; return whether there was one."""
 
         def remove() -> bool:
             with self.files.lock:
-                path, partial = self.files.partial(campaign.group, partial_name(campaign.id, name))
-                self.files.forget(path)
+                unfinished = self.give_up(campaign.group, campaign.id, name)
                 row = self.store.recordings.delete(campaign.group, campaign.id, name)
                 if row is not None:
                     self._release(campaign.group, files_named(row))
-                return row is not None or partial is not None
+                return row is not None or unfinished
 
         there = await asyncio.to_thread(remove)
         await self.settle(campaign)
@@ -273,7 +295,7 @@ class Uploads:
             # of a damaged declaration nobody knows the names: its parts go when they are a day old
             with suppress(ValueError, LookupError, TypeError):
                 for name in files_of("" if campaign is None else campaign.text):
-                    self.files.forget(self.files.partial(group, partial_name(id, name))[0])
+                    self.give_up(group, id, name)
             self._release(group, [key for row in rows for key in files_named(row)])
         return there
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from api.components import ThisService
 from api.conventions import problems
 from api.problems import Problem
 from api.schemas.common import Answer
+from api.security import check_local
 
 router = APIRouter(tags=["health"])
 
@@ -42,7 +43,13 @@ def ready(components: ThisService) -> State:
     "/metrics",
     summary="Metrics for Prometheus",
     response_class=Response,
-    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, "description": "Counters since the start."}},
+    description="Where no keys are asked for, to this machine alone.",
+    responses={
+        200: {"content": {"text/plain": {"schema": {"type": "string"}}}, "description": "Counters since the start."},
+        **problems(403, always=()),
+    },
 )
-def metrics(components: ThisService) -> Response:
+def metrics(request: Request, components: ThisService) -> Response:
+    if not components.settings.asks_for_keys:
+        check_local(request)
     return Response(generate_latest(components.metrics.registry), media_type=CONTENT_TYPE_LATEST)

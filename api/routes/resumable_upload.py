@@ -66,9 +66,7 @@ async def head(id: CampaignId, name: RecordingName, components: ThisService, cal
     state = await state_of(components, campaign, name)
     if state is None:
         raise Problem(404, "no part of this recording has been uploaded")
-    return Response(
-        status_code=204, headers={"Upload-Offset": str(state.offset), "Upload-Length": str(state.length), "Cache-Control": "no-store"}
-    )
+    return Response(status_code=204, headers={"Upload-Offset": str(state.offset), "Upload-Length": str(state.length)})
 
 
 @router.patch(
@@ -81,7 +79,7 @@ async def head(id: CampaignId, name: RecordingName, components: ThisService, cal
     responses={
         201: {"model": RecordingAnswer, "description": "The upload is complete and stored."},
         204: {"description": "The part is stored; more parts follow.", "headers": _OFFSET},
-        **problems(404, 408, 409, *BODY),
+        **problems(404, 408, 409, 410, *BODY),
     },
 )
 async def patch(
@@ -162,9 +160,10 @@ async def receive(
             check_digest(upload.whole, received.sha256)
             check_digest(state.sha256 or None, received.sha256, "Upload-Metadata")
             stored = await take(components, campaign, name, received, replacing)
-        except (InputError, Problem) as error:
+        except Exception as error:
+            _check_wanted(components, state)
             # kept unless they are at fault: the disk may have room again, or the client may replace the other content
-            if isinstance(error, InputError) or error.status in (404, 422):
+            if isinstance(error, InputError) or (isinstance(error, Problem) and error.status in (404, 422)):
                 await run_in_threadpool(components.files.forget, path)
             raise
         finally:
@@ -176,15 +175,17 @@ async def receive(
 @contextmanager
 def alone(components: Components, campaign: Campaign, name: str) -> Iterator[None]:
     """Keep other requests from writing the same upload meanwhile."""
-    key = (campaign.id, name)
-    if key in components.uploads.writing:
+    if (campaign.id, name) in components.uploads.writing:
         # perhaps by the same client, whose lost connection has not been noticed yet
         raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
-    components.uploads.writing.add(key)
-    try:
+    with components.uploads.alone(campaign.id, name):
         yield
-    finally:
-        components.uploads.writing.discard(key)
+
+
+def _check_wanted(components: Components, state: Partial) -> None:
+    """Refuse to go on with an upload that another request has given up meanwhile."""
+    if (state.campaign, state.name) in components.uploads.given_up:
+        raise Problem(410, "this upload has been given up meanwhile: none of its bytes is kept")
 
 
 async def state_of(components: Components, campaign: Campaign, name: str) -> Partial | None:
@@ -231,33 +232,40 @@ async def _go_on(components: Components, campaign: Campaign, name: str, offset: 
 
 async def _append(request: Request, components: Components, group: str, path: Path, state: Partial, checksum: Checksum | None) -> Part:
     """Append a part and record the state, also where the part breaks off."""
-    part, digest = await run_in_threadpool(Part, path, state.offset), hashlib.new(checksum.algorithm if checksum else "sha256")
-    noted = 0
+    with storage_problems():
+        part = await run_in_threadpool(Part, path, state.offset)
+    digest, noted = hashlib.new(checksum.algorithm if checksum else "sha256"), 0
     try:
-        async for block in blocks(request, components):
-            if part.size + len(block) > state.length:
-                raise InputError(
-                    "body", "more bytes than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}"
-                )
-            with storage_problems():
+        try:
+            async for block in blocks(request, components):
+                _check_wanted(components, state)
+                if part.size + len(block) > state.length:
+                    raise InputError(
+                        "body", "more bytes than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}"
+                    )
                 await write(components, group, part, block, part.size - state.offset + len(block))
-            digest.update(block)
-            if checksum is None and (part.size - state.offset) // LOOK > noted:
-                noted += 1
-                await run_in_threadpool(_note, components, part, part.size, state)
-        if checksum is not None:
-            checksum.check(checksum.digest, digest.hexdigest())
-    except (Problem, InputError, HTTPException) as error:
-        # a part with a digest counts only when it is complete
-        kept = state.offset if checksum is not None or isinstance(error, InputError) else part.size
-        await run_in_threadpool(_note, components, part, kept, state)
+                digest.update(block)
+                if checksum is None and (part.size - state.offset) // LOOK > noted:
+                    noted += 1
+                    await run_in_threadpool(_note, components, part, part.size, state)
+            if checksum is not None:
+                checksum.check(checksum.digest, digest.hexdigest())
+        except (Problem, InputError, HTTPException) as error:
+            # a part with a digest counts only when it is complete
+            kept = state.offset if checksum is not None or isinstance(error, InputError) else part.size
+            await run_in_threadpool(_note, components, part, kept, state)
+            raise
+        await run_in_threadpool(_note, components, part, part.size, state)
+    except BaseException:
         part.close()
         raise
-    await run_in_threadpool(_note, components, part, part.size, state)
     return part
 
 
 def _note(components: Components, part: Part, offset: int, state: Partial) -> None:
     with storage_problems():
         part.sync()
-        components.files.note(part.path, replaced(state, offset=offset))
+        with components.files.lock:
+            # an offset that is noted, and acknowledged, has its bytes on the disk
+            _check_wanted(components, state)
+            components.files.note(part.path, replaced(state, offset=offset))

@@ -166,8 +166,7 @@ async def state(id: CampaignId, name: RecordingName, components: ThisService, ca
     found = await state_of(components, campaign, name)
     if found is None:
         raise Problem(404, "no such upload has begun")
-    told = {"Upload-Offset": str(found.offset), "Upload-Length": str(found.length), "Cache-Control": "no-store"}
-    return Response(status_code=204, headers=told)
+    return Response(status_code=204, headers={"Upload-Offset": str(found.offset), "Upload-Length": str(found.length)})
 
 
 @router.patch(
@@ -178,7 +177,7 @@ async def state(id: CampaignId, name: RecordingName, components: ThisService, ca
     openapi_extra=guard("upload", requestBody=_BODY, parameters=_PARAMETERS, **{"x-content-types": (PART,)}),
     responses={
         204: {"description": "The part is stored.", "headers": _TUS | _OFFSET},
-        **problems(400, 404, 408, 409, 412, 413, 415, 422, 460),
+        **problems(400, 404, 408, 409, 410, 412, 413, 415, 422, 460),
     },
 )
 async def send_part(
@@ -201,16 +200,14 @@ async def send_part(
     "/{name}",
     status_code=204,
     summary="Give up an upload by tus",
-    description="A recording that is stored already stays: it is deleted as a recording.",
+    description="A part that is under way is answered with 410. A recording that is stored already stays: it is deleted as a recording.",
     openapi_extra=guard("upload", parameters=_PARAMETERS),
     responses={204: {"description": "Its bytes are gone.", "headers": _TUS}, **problems(404, 412, 422)},
 )
 async def give_up(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
-    path, found = await run_in_threadpool(components.files.partial, campaign.group, partial_name(campaign.id, name))
-    if found is None:
+    if not await run_in_threadpool(_given_up, components, campaign, name):
         raise Problem(404, "no such upload has begun")
-    await run_in_threadpool(components.files.forget, path)
     return Response(status_code=204)
 
 
@@ -232,6 +229,11 @@ def _begin(components: Components, campaign: Campaign, state: Partial) -> int:
         path.touch()
         components.files.note(path, state)
     return 0
+
+
+def _given_up(components: Components, campaign: Campaign, name: str) -> bool:
+    with components.files.lock:
+        return components.uploads.give_up(campaign.group, campaign.id, name)
 
 
 def _length(components: Components, campaign: Campaign, name: str) -> int:

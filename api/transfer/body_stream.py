@@ -15,8 +15,8 @@ from fastapi.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from api.components import Components
-from api.files import Full, Part, TooLarge, no_room
-from api.problems import Problem
+from api.files import Full, Part, TooLarge
+from api.problems import Problem, of_disk
 from api.reading.uploads import Received
 
 #: Size of a block, and amount written between two checks of the free space [bytes].
@@ -93,12 +93,11 @@ def storage_problems() -> Iterator[None]:
         yield
     except TooLarge as error:
         raise Problem(413, str(error)) from None
-    except Full:
-        raise Problem(503, "the disk has too little free space left", headers={"Retry-After": "600"}) from None
-    except OSError as error:
-        if not no_room(error):
+    except (Full, OSError) as error:
+        problem = of_disk(error)
+        if problem is None:
             raise
-        raise Problem(503, "the disk is full", headers={"Retry-After": "600"}) from None
+        raise problem from None
 
 
 @asynccontextmanager

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from rcsa_ident.errors import InputError, RcsaIdentError
+from rcsa_ident.errors import InputError, RcsaIdentError, no_cache
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn, TaskID
@@ -74,6 +74,11 @@ def answers(command: Command) -> Command:
             _refuse(str(error), FAILED, kwargs.get("json_"), {})
         except BrokenProcessPool:
             _refuse("a worker process was killed (out of memory?); use fewer --processes", FAILED, kwargs.get("json_"), {})
+        except RuntimeError as error:
+            refused = no_cache(error)
+            if refused is None:
+                raise
+            _refuse(str(refused), BAD_INPUT, kwargs.get("json_"), {"field": refused.field, "where": refused.where})
         except KeyboardInterrupt:
             _refuse("interrupted: nothing was written", INTERRUPTED, kwargs.get("json_"), {})
 

@@ -13,7 +13,7 @@ import uvicorn
 
 from api import access
 from api.access import TimedHeadProtocol
-from api.connections import FIRST_MESSAGE, Connections, SmallHelloProtocol, listeners, network_of
+from api.connections import FIRST_MESSAGE, MOST_FRAGMENTS, Connections, SmallHelloProtocol, listeners, network_of
 from api.main import create_app
 from api.settings import Settings
 from tests.api.in_process import Here, Near
@@ -176,6 +176,24 @@ def test_a_websocket_without_a_small_first_message_is_closed(few):
         with pytest.raises(ConnectionClosedError) as error:
             link.recv(PATIENCE)
     assert error.value.rcvd.code == 1009
+    until(lambda: not counted.open)
+
+
+def test_a_websocket_with_very_many_fragments_is_closed(few):
+    """By their number: hardly a byte is in them."""
+    from websockets.exceptions import ConnectionClosedError
+    from websockets.sync.client import connect
+
+    port, counted = few
+    address = f"ws://127.0.0.1:{port}/v1/forces/stream"
+    with connect(address, compression=None) as link:
+        link.send(["{", *[""] * (MOST_FRAGMENTS - 10), "}"])
+        assert "problem" in link.recv(PATIENCE)
+    with connect(address, compression=None) as link:
+        with suppress(ConnectionClosedError):
+            link.send([" "] * (MOST_FRAGMENTS + 10))
+        with pytest.raises(ConnectionClosedError, match=f"more than {MOST_FRAGMENTS} fragments"):
+            link.recv(PATIENCE)
     until(lambda: not counted.open)
 
 

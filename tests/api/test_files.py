@@ -27,8 +27,8 @@ def kept(files, group, content, kind=UPLOADS):
     part.write(content)
     part.sync()
     key = part.sha256()
-    part.close()
     files.keep(group, kind, key, part.path)
+    part.drop()
     return key
 
 

@@ -197,6 +197,14 @@ def test_one_line_of_log_for_each_request(http, caplog):
     assert (line["request_id"], line["method"], line["status"], line["group"]) == ("r1", "GET", 200, "local")
 
 
+def test_no_answer_is_kept_by_who_passes_it_on(http, client):
+    id = client.make_machine("m").id
+    for path in ("/v1/machines", f"/v1/machines/{id}", "/v1/toolings/unknown", "/v1/nothing", "/metrics", "/ready"):
+        assert http.get(path).headers.get_list("cache-control") == ["no-store"], path
+    # what belongs to nobody may be kept
+    assert http.get("/").headers.get_list("cache-control") == ["no-cache"]
+
+
 def test_counters(http):
     http.get("/v1/machines")
     http.get("/v1/machines/unknown")

@@ -198,10 +198,27 @@ def test_without_keys_no_foreign_page_and_no_proxy_is_answered(http):
         assert answer.status_code == 403, origin
         assert "another origin" in answer.json()["detail"]
     assert sent(Origin="http://localhost").status_code == 404
-    for name in ("Forwarded", "X-Forwarded-For", "X-Forwarded-Host", "x-forwarded-proto", "X-Real-IP", "Via"):
+    assert sent(**{"Sec-Fetch-Site": "cross-site"}).status_code == 403
+    assert sent(**{"Sec-Fetch-Site": "same-origin"}).status_code == 404
+    names = (
+        "Forwarded", "X-Forwarded", "X-Forwarded-For", "X-Forwarded-Host", "x-forwarded-proto", "X-Original-Forwarded-For", "X-Real-IP",
+        "X-Client-IP", "X-Cluster-Client-IP", "True-Client-IP", "CF-Connecting-IP", "CF-Connecting-IPv6", "Fastly-Client-IP",
+        "X-Envoy-External-Address", "X-Remote-Addr", "Via",
+    )  # fmt: skip
+    for name in names:
         answer = http.get("/v1/machines", headers={name: "for=10.0.0.1"})
         assert answer.status_code == 403, name
         assert name.lower() in answer.json()["detail"]
+    for name in ("Accept-Language", "User-Agent", "X-Request-ID", "If-Match", "Idempotency-Key", "DNT", "Upgrade-Insecure-Requests"):
+        assert http.get("/v1/machines", headers={name: "1"}).status_code == 200, name
+
+
+def test_metrics_are_for_this_machine_where_no_keys_are_asked_for(http, guarded_http):
+    for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}, {"X-Forwarded-For": "10.0.0.1"}):
+        assert http.get("/metrics", headers=headers).status_code == 403
+    assert http.get("/metrics", headers={"Host": "127.0.0.1:8000"}).status_code == 200
+    # else a scraper calls the service as everybody does
+    assert guarded_http[0].get("/metrics", headers={"Host": "rcsa.example"}).status_code == 200
 
 
 def test_with_keys_a_proxy_may_stand_in_front(guarded_http):

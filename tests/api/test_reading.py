@@ -6,6 +6,7 @@ import asyncio
 import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import threading
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -82,6 +84,42 @@ def write(size):
 
 def no_space():
     raise OSError(errno.ENOSPC, "no space left on the device")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("call", "arguments"), [(refuse, ()), (bug, ()), (end, (signal.SIGSEGV,))], ids=["refused", "failed", "ended"])
+def test_no_file_is_blamed_while_the_disk_is_full(reader, monkeypatch, call, arguments):
+    """Libraries fail in many ways where they cannot write."""
+    with monkeypatch.context() as short:
+        short.setattr("shutil.disk_usage", lambda _: shutil._ntuple_diskusage(10**10, 10**10, 0))
+        with pytest.raises(Full):
+            ask(reader, call, *arguments)
+        assert ask(reader, pow, 2, 5) == 32
+    with pytest.raises(InputError):
+        ask(reader, call, *arguments)
+
+
+@pytest.mark.slow
+def test_a_reader_that_cannot_begin_begins_when_there_is_room(tmp_path, monkeypatch):
+    found = Reader(LIMITS, 1, nothing, tmp_path)
+    with monkeypatch.context() as short:
+        short.setattr("tempfile.mkdtemp", lambda **_: no_space())
+        found.start()
+        with pytest.raises(OSError, match="no space left"):
+            ask(found, pow, 2, 5)
+    try:
+        assert ask(found, pow, 2, 5) == 32
+    finally:
+        found.stop()
+
+
+def test_what_was_deleted_meanwhile_is_missed_by_its_reader(reader, tmp_path):
+    (tmp_path / "there").write_text("1")
+    assert ask(reader, are_there, tmp_path / "gone", tmp_path / "there", tmp_path / "gone too") == [False, True, False]
+
+
+def are_there(*paths):
+    return [path.exists() for path in paths]
 
 
 def lines_of(text, path, other):
@@ -328,6 +366,28 @@ def test_samples_stay_as_they_were_to_the_last_bit(tmp_path, kind):
     assert np.isnan(found.samples[[7, 8], 0]).all() == ("f" in kind)
     # half the size where nothing is lost by it
     assert path.stat().st_size < 3 * 5000 * (4 if kind in ("f4", "i2", "u1", "exact f8") else 8) + 20_000
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="a system that allocates nothing in advance")
+@pytest.mark.parametrize(("count", "rate"), [(1, 1000.0), (5000, 1000.0), (70_000, 1.0), (1_000_001, 51200.0), (100, 1e7)])
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+def test_room_for_samples_is_allocated_before_the_first_is_written(tmp_path, monkeypatch, count, rate, kind):
+    path, allocated, allocate = tmp_path / "x.h5", [], os.posix_fallocate
+
+    def noted(file, start, size):
+        allocated.append(size)
+        allocate(file, start, size)
+
+    monkeypatch.setattr(os, "posix_fallocate", noted)
+    values = np.random.default_rng(3).standard_normal(count).astype(kind)
+    write_normalised(path, rate, [values] * len(SENSORS), SENSORS)
+    with h5py.File(path) as file:
+        written = file.id.get_filesize()
+    # all of it, and nothing of what was too much stays
+    assert allocated[0] >= path.stat().st_size == written
+    monkeypatch.setattr(os, "posix_fallocate", lambda *_: no_space())
+    with pytest.raises(OSError, match="no space left"):
+        write_normalised(path, rate, [values] * len(SENSORS), SENSORS)
 
 
 def test_samples_can_be_read_in_parts(tmp_path):

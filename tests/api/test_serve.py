@@ -306,3 +306,20 @@ def test_what_the_command_refuses(tmp_path, arguments, words):
     assert found.returncode == 2
     assert words in found.stderr
     assert "Traceback" not in found.stderr
+
+
+#: A system on which numba finds no folder that can be written.
+NOWHERE = "import numba.core.caching as c; c.CacheImpl._locator_classes = []; from api.serve import main; main()"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arguments", [(), ("worker",)])
+def test_kernels_that_can_be_kept_nowhere_are_told_in_words(tmp_path, arguments):
+    _, environment = command(tmp_path / "data", NUMBA_CACHE_DIR="/no/such")
+    done = subprocess.run(
+        [sys.executable, "-c", NOWHERE, *arguments], env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert done.returncode == 2
+    assert (
+        done.stderr == "error: NUMBA_CACHE_DIR: found /no/such, allowed is a folder that can be written, where compiled kernels are kept\n"
+    )

@@ -16,11 +16,12 @@ from tusclient.client import TusClient
 from tusclient.exceptions import TusCommunicationError
 
 from api.client import Client
+from api.files import Part
 from tests.api.in_process import embedded, service
 from tests.api.recordings import content, declared
 from tests.fixtures.paths import ROOT
 from tests.fixtures.service import serving
-from tests.fixtures.waiting import until
+from tests.fixtures.waiting import PATIENCE, until
 
 SAYS = {"Tus-Resumable": "1.0.0"}
 PART = SAYS | {"Content-Type": "application/offset+octet-stream"}
@@ -139,6 +140,32 @@ def test_an_upload_that_is_given_up_is_gone_and_a_recording_is_not(place):
     assert client.head(where, headers=SAYS).headers["upload-offset"] == str(len(raw))
 
 
+@pytest.mark.parametrize("face", ["uploads", "recordings"])
+@pytest.mark.parametrize("half", [True, False])
+@pytest.mark.parametrize("during", ["written", "synced", "stored"])
+def test_a_part_of_an_upload_that_is_given_up_meanwhile_is_not_acknowledged(place, monkeypatch, face, half, during):
+    client, path, raw = place
+    components, told = client.app.state.components, []
+    where = begun(client, path, len(raw))
+    assert sent(client, where, raw[:1000], 0).status_code == 204
+    what, name = {"written": (Part, "write"), "synced": (Part, "sync"), "stored": (components.store.recordings, "get")}[during]
+    before = getattr(what, name)
+
+    def given_up(*arguments):
+        if not told:
+            told.append(client.delete(f"{path.removesuffix('uploads')}{face}/{NAME}", headers=SAYS).status_code)
+        return before(*arguments)
+
+    monkeypatch.setattr(what, name, given_up)
+    # of an upload that lacks bytes nothing is stored
+    half = half and during != "stored"
+    answer = sent(client, where, raw[1000:2000] if half else raw[1000:], 1000)
+    assert (told, answer.status_code) == ([204], 410)
+    assert client.head(where, headers=SAYS).status_code == 404
+    assert [each for each in components.files.folder.rglob("*") if each.is_file()] == []
+    assert sent(client, begun(client, path, len(raw)), raw, 0).status_code == 204
+
+
 def test_other_content_needs_to_be_told(place, tmp_path):
     client, path, raw = place
     assert sent(client, begun(client, path, len(raw)), raw, 0).status_code == 204
@@ -219,15 +246,15 @@ def test_an_upload_that_is_being_stored_never_seems_not_to_have_begun(store, tmp
         put = store.recordings.put
 
         def asked_meanwhile(*arguments):
-            # its bytes have been moved to their place, and no row names them yet
+            # its bytes have their place, and no row names them yet
             asking.start()
-            asking.join(1.0)
+            asking.join(PATIENCE)
             return put(*arguments)
 
         monkeypatch.setattr(store.recordings, "put", asked_meanwhile)
         assert sent(http, where, raw, 0).status_code == 204
-        asking.join()
-    assert [(answer.status_code, answer.headers["upload-offset"]) for answer in answers] == [(204, str(len(raw)))]
+        assert [(answer.status_code, "retry-after" in answer.headers) for answer in answers] == [(503, True)]
+        assert http.head(where, headers=SAYS).headers["upload-offset"] == str(len(raw))
 
 
 def test_what_another_group_uploads_is_not_there(guarded_http, tmp_path):

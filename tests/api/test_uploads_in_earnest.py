@@ -25,6 +25,7 @@ from api.files import STALE_FILE, STALE_PART, UPLOADS
 from api.main import create_app
 from api.reading.examine import write_normalised
 from api.settings import Settings
+from api.stores.entities import Unavailable
 from api.stores.sql import open_store
 from tests.api.in_process import Here, embedded, refused, service
 from tests.api.recordings import content, declared
@@ -302,6 +303,25 @@ def test_parts_outlive_a_full_disk(http, client, tmp_path, monkeypatch):
     answer = http.head(url)
     assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(len(raw)))
     assert client.recording(campaign, "c0_cut.h5").sha256 == hashlib.sha256(raw).hexdigest()
+    assert len(files_in(tmp_path)) == 2
+
+
+def test_parts_outlive_a_database_that_takes_no_row(http, client, tmp_path, monkeypatch):
+    """Its disk may be full: the files stand in their places already, and no row names them."""
+    campaign = client.make_campaign(client.make_machine("m").id, declared(1)).id
+    url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
+
+    def full(*_):
+        raise Unavailable
+
+    monkeypatch.setattr(http.app.state.components.store.recordings, "put", full)
+    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
+    assert http.patch(url, content=raw, headers=headers).status_code == 503
+    assert http.head(url).status_code == 503
+    monkeypatch.undo()
+    answer = http.head(url)
+    assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(len(raw)))
+    assert http.get(f"{url}/file").content == raw
     assert len(files_in(tmp_path)) == 2
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import subprocess
+import sys
 
 import pytest
 import typer
@@ -36,3 +38,29 @@ def test_a_field_is_named_as_the_commands_option_where_it_has_one(given, words, 
     with pytest.raises(typer.Exit):
         command(**given)
     assert words in capsys.readouterr().err
+
+
+#: A system on which numba finds no folder that can be written.
+NOWHERE = """
+import numba.core.caching
+numba.core.caching.CacheImpl._locator_classes = []
+from rcsa_ident.cli import main
+main()
+"""
+
+
+@pytest.mark.slow
+def test_kernels_that_can_be_kept_nowhere_are_told_in_words(tmp_path):
+    words = [sys.executable, "-c", NOWHERE, "check", str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("NUMBA_CACHE_DIR: found ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_other_errors_of_a_library_stay_what_they_are():
+    def fails():
+        raise RuntimeError("something else")
+
+    with pytest.raises(RuntimeError, match="something else"):
+        answers(fails)()

@@ -1,0 +1,86 @@
+"""A disk that fills while a recording is stored: at every call that writes, whichever process makes it, no acknowledged byte is lost."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import subprocess
+import sys
+from functools import partial
+
+import httpx2
+import pytest
+
+from api.client import Client
+from tests.api.recordings import content, declared
+from tests.api.test_tus import NAME, SAYS, begun, sent
+from tests.fixtures.paths import ROOT
+from tests.fixtures.service import serving
+from tests.fixtures.waiting import PATIENCE, until
+
+NEVER = 1 << 40
+
+
+class Disk:
+    """A disk below a folder that is full from a call that writes on; the library in front of the C library counts them."""
+
+    def __init__(self, folder):
+        self.folder, self.state, self.library = folder / "disk", folder / "state", folder / "full_disk.so"
+        subprocess.run(["cc", "-shared", "-fPIC", "-o", self.library, ROOT / "tests" / "fixtures" / "full_disk.c", "-ldl"], check=True)
+        self.folder.mkdir()
+        self.full_at(NEVER)
+
+    @property
+    def settings(self):
+        return {"LD_PRELOAD": str(self.library), "FULL_DISK_STATE": str(self.state), "FULL_DISK_FOLDER": str(self.folder)}
+
+    def full_at(self, call):
+        """Count from here: this call finds the disk full, and so do all behind it."""
+        with self.state.open("r+b" if self.state.exists() else "xb") as file:
+            file.write(struct.pack("=qq", 0, call))
+
+    @property
+    def calls(self):
+        return struct.unpack("=qq", self.state.read_bytes())[0]
+
+
+def told_offset(http, where):
+    """Return the offset of an upload, empty where the service does not tell it yet."""
+    answer = http.head(where, headers=SAYS)
+    assert answer.status_code in (204, 503)
+    return answer.headers.get("upload-offset", "")
+
+
+@pytest.mark.slow(120)
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("cc") is None, reason="a library in front of the C library is compiled")
+def test_no_acknowledged_byte_is_lost_wherever_the_disk_fills(tmp_path):
+    disk, raw = Disk(tmp_path), content(tmp_path)
+    half = len(raw) // 2
+    with (
+        serving(disk.folder / "data", RCSA_IDENT_FREE_BYTES="0", **disk.settings) as served,
+        httpx2.Client(base_url=served.url, timeout=PATIENCE) as http,
+    ):
+        client = Client(http=http)
+        id = client.make_campaign(client.make_machine("m").id, declared(1)).id
+        path, recording = f"/v1/campaigns/{id}/uploads", f"/v1/campaigns/{id}/recordings/{NAME}"
+        call, stored = 0, False
+        while not stored:
+            call += 1
+            where = begun(http, path, len(raw))
+            assert sent(http, where, raw[:half], 0).status_code == 204
+            disk.full_at(call)
+            last = sent(http, where, raw[half:], half)
+            stored = disk.calls < call
+            # nothing is wrong with the file, and while the disk is full nobody is told that it has gone
+            assert last.status_code == 204 if stored else last.status_code in (204, 503), (call, last.text)
+            meanwhile = http.head(where, headers=SAYS)
+            assert meanwhile.status_code == 503 or int(meanwhile.headers["upload-offset"]) >= half, call
+            disk.full_at(NEVER)
+            offset = int(until(partial(told_offset, http, where)))
+            assert offset >= half, call
+            if offset < len(raw):
+                assert sent(http, where, raw[offset:], offset).status_code == 204
+            assert http.get(f"{recording}/file").content == raw, call
+            assert http.delete(recording).status_code == 204
+        # parts, samples and rows, each with what makes them last
+        assert call > 20
