@@ -200,7 +200,16 @@ N100 M30
 %
 """
 #: Forms that a program's suffixes stand for: the words are the same.
-PROGRAMS = {".nc": _PROGRAM, ".tap": _PROGRAM.lower(), ".ngc": _PROGRAM.replace("(", "; (", 3), ".gcode": _PROGRAM.replace("%\n", "")}
+PROGRAMS = {
+    ".nc": _PROGRAM,
+    ".tap": _PROGRAM.lower(),
+    ".ngc": _PROGRAM.replace("(", "; (", 3),
+    ".gcode": _PROGRAM.replace("%\n", ""),
+    ".mpf": _PROGRAM.replace("%\n", "").replace("I0. J4.", "CR=4."),
+    ".eia": _PROGRAM.replace("G21 G90 G94 G17", "G0 G17 G21 G40 G49 G80 G90 G94"),
+    ".cnc": _PROGRAM.replace("N10 ", "G05 P10000\nN10 ").replace("X-10. Y6. Z5.", "X-10. Y6. Z5. A0."),
+    ".txt": _PROGRAM.replace("\n", "\r\n"),
+}
 
 
 def receptance(frequency: np.ndarray, shift: float = 1.0) -> np.ndarray:
