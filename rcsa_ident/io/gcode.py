@@ -35,7 +35,8 @@ _ENDS, _BEHIND = (2, 30), (0, 1, 5, 9, 60)
 
 _PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 _AXES, _OFFSETS = "XYZ", "IJK"
-_FURTHER = {"P", "Q", "L", ",R", ",C"}
+_CORNERS = (",R", ",C")
+_FURTHER = ("P", "Q", "L", *_CORNERS)
 _HEIDENHAIN = re.compile(r"^\s*\d*\s*BEGIN PGM", re.MULTILINE | re.IGNORECASE)
 _PECKED = "G83 comes back to the depth that it has drilled: the control's own clearance is taken for 0"
 _LEFT = "the program ends in line {}: line {} and those behind it are not read"
@@ -197,7 +198,8 @@ class _Program:
         single = told.get("single")
         axes = {i: words[letter] * self.unit for i, letter in enumerate(_AXES) if letter in words}
         offsets = {i: words[letter] * self.unit for i, letter in enumerate(_OFFSETS) if letter in words}
-        self._check_further(codes, words, single)
+        if not words.keys().isdisjoint(_FURTHER):
+            self._check_further(codes, words, single)
         if self.corner and (single in (28, 30, 53) or self.cycle or set(_ENDS) & set(codes["M"])):
             raise self.corner.refused("no move behind it", "two moves")
         if single in (28, 30):
@@ -220,8 +222,6 @@ class _Program:
 
     def _check_further(self, codes: Mapping[str, list[float]], words: Mapping[str, float], single: float | None) -> None:
         """Refuse words that nothing in their line reads."""
-        if not words.keys() & _FURTHER:
-            return
         said = codes["M"] or single == 4 or any(KINDS[code] in ("told", "system") for code in codes["G"])
         if not (said or self.cycle) and ("Q" in words or ("P" in words and self.motion not in (2, 3))):
             raise InputError(
@@ -229,7 +229,7 @@ class _Program:
             )
         if "L" in words and not self.cycle:
             raise InputError("block", "L", "it in cycles, where it repeats holes")
-        if {",R", ",C"} & words.keys() and (self.motion != 1 or self.cycle or not {"X", "Y", "Z"} & words.keys()):
+        if not words.keys().isdisjoint(_CORNERS) and (self.motion != 1 or self.cycle or not {"X", "Y", "Z"} & words.keys()):
             raise InputError("block", "a corner without a straight move", ",R and ,C in moves by G1")
 
     def _set(self, told: Mapping[str, float], codes: Mapping[str, list[float]], words: Mapping[str, float]) -> None:
@@ -238,7 +238,7 @@ class _Program:
         self.plane = told.get("plane", self.plane)
         self.absolute = told.get("distance", 90 if self.absolute else 91) == 90
         self.absolute_centres = told.get("centre", 90.1 if self.absolute_centres else 91.1) == 90.1
-        if "cycle" in told and told["cycle"] != 80:
+        if told.get("cycle", 80) != 80:
             if "motion" in told:
                 raise InputError("block", f"G{told['motion']:g} and G{told['cycle']:g}", "one of them in a line")
             self.cycle = Cycle(int(told["cycle"]), self.cycle.initial if self.cycle else self.at[2])
@@ -246,7 +246,8 @@ class _Program:
             self.cycle = None
         if "motion" in told or "cycle" in told:
             self.motion = told.get("motion")
-        self.to_initial = 98 in codes["G"] or (self.to_initial and 99 not in codes["G"])
+        if 98 in codes["G"] or 99 in codes["G"]:
+            self.to_initial = 98 in codes["G"]
         if "system" in told:
             system = f"G{told['system']:g}{' P' + format(words['P'], 'g') if 'P' in words else ''}"
             if self.system not in ("", system):
@@ -313,8 +314,10 @@ class _Program:
                 self._add(target, RAPID, number)
         elif arc:
             self._arc(target, offsets, words, number)
-        else:
+        elif self.corner or not words.keys().isdisjoint(_CORNERS):
             self._straight(target, words, number)
+        else:
+            self._add(target, self.feed, number)
         self.at = target
         for i in axes:
             self.lost.pop(i, None)

@@ -15,7 +15,7 @@ _LONGEST_LINE = 1000
 _LARGEST_NUMBER = 1e7
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
-_WORDS = re.compile(rf"(?:[A-Z]{_NUMBER}|,[CR]{_NUMBER})*")
+_WORDS = re.compile(rf"(?:[A-Z]{_NUMBER})*")
 _CORNER = re.compile(rf",([CR])({_NUMBER})")
 #: Words of Sinumerik: the radius of an arc, and its further turns.
 _RADIUS, _TURNS = re.compile(rf"CR=({_NUMBER})"), re.compile(r"TURN=(\d{1,6})")
@@ -75,9 +75,10 @@ def block_of(line: str) -> str:
         text = _TURNS.sub(lambda turns: f"P{int(turns[1]) + 1}", _RADIUS.sub(r"R\1", text))
     if any(sign in text for sign in "#[]="):
         raise InputError("block", text, "numbers: macros are not run")
-    known = _WORDS.match(text)
-    if known is None or known.end() != len(text):
-        rest = text[known.end() if known else 0 :]
+    words = _CORNER.sub(r"\1\2", text) if "," in text else text
+    known = _WORDS.match(words)
+    if known is None or known.end() != len(words):
+        rest = words[known.end() if known else 0 :]
         allowed = "words of a letter and a number with a decimal point, comments in ( ) or behind ;"
         raise InputError("block", rest, allowed)
     if slashed and re.search(r"[GXYZIJKRF]", text):
@@ -108,11 +109,8 @@ def words_of(block: str) -> tuple[dict[str, list[float]], dict[str, float], dict
     found = parse_parameters(_BARE_POINT.sub("", rest))
     if len(found) != sum(map(str.isalpha, rest)):
         raise InputError("block", block, "each word once in a line")
-    letters = f"{_LETTERS}E" if 187 in codes["G"] else _LETTERS
     for letter, value in found.items():
-        if letter in ROTARY and float(value) == 0.0:
-            continue
-        if letter not in letters:
+        if letter not in _LETTERS and not (letter in ROTARY and float(value) == 0.0) and not (letter == "E" and 187 in codes["G"]):
             raise InputError("block", f"{letter}{value}", f"words {', '.join(_LETTERS)}, G and M: other axes are followed at 0 alone")
         if not abs(float(value)) <= _LARGEST_NUMBER:
             raise InputError(letter, value, f"at most {_LARGEST_NUMBER:g}")
