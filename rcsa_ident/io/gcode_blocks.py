@@ -23,6 +23,7 @@ _CODES = re.compile(rf"([GM])({_NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 #: A point that no digit follows: the tokeniser takes it for a whole number and fails.
 _BARE_POINT = re.compile(r"\.(?!\d)")
+_MACRO = re.compile(r"[#\[\]=]")
 _LABEL = re.compile(r"[O:]\d+")
 _NUMBERED = re.compile(r"N\d+\.?")
 
@@ -73,7 +74,7 @@ def block_of(line: str) -> str:
         return ""
     if "=" in text:
         text = _TURNS.sub(lambda turns: f"P{int(turns[1]) + 1}", _RADIUS.sub(r"R\1", text))
-    if any(sign in text for sign in "#[]="):
+    if _MACRO.search(text):
         raise InputError("block", text, "numbers: macros are not run")
     words = _CORNER.sub(r"\1\2", text) if "," in text else text
     known = _WORDS.match(words)
