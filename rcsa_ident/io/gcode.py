@@ -15,7 +15,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
-from rcsa_ident.io.gcode_blocks import KINDS, ROTARY, block_of, words_of
+from rcsa_ident.io.gcode_blocks import CORNERS, FURTHER, KINDS, ROTARY, block_of, check_further, words_of
 from rcsa_ident.io.gcode_cycles import MOST_REPEATS, Corner, Cycle
 from rcsa_ident.io.text_columns import decoded
 from rcsa_ident.remarks import Remark
@@ -35,8 +35,6 @@ _ENDS, _BEHIND = (2, 30), (0, 1, 5, 9, 60)
 
 _PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 _AXES, _OFFSETS = "XYZ", "IJK"
-_CORNERS = (",R", ",C")
-_FURTHER = ("P", "Q", "L", *_CORNERS)
 _HEIDENHAIN = re.compile(r"^\s*\d*\s*BEGIN PGM", re.MULTILINE | re.IGNORECASE)
 _PECKED = "G83 comes back to the depth that it has drilled: the control's own clearance is taken for 0"
 _LEFT = "the program ends in line {}: line {} and those behind it are not read"
@@ -198,8 +196,8 @@ class _Program:
         single = told.get("single")
         axes = {i: words[letter] * self.unit for i, letter in enumerate(_AXES) if letter in words}
         offsets = {i: words[letter] * self.unit for i, letter in enumerate(_OFFSETS) if letter in words}
-        if not words.keys().isdisjoint(_FURTHER):
-            self._check_further(codes, words, single)
+        if not words.keys().isdisjoint(FURTHER):
+            check_further(codes, words, single, self.motion, self.cycle is not None)
         if self.corner and (single in (28, 30, 53) or self.cycle or set(_ENDS) & set(codes["M"])):
             raise self.corner.refused("no move behind it", "two moves")
         if single in (28, 30):
@@ -219,18 +217,6 @@ class _Program:
         if 5 in codes["M"]:
             self.turning = False
         return bool(set(_ENDS) & set(codes["M"]))
-
-    def _check_further(self, codes: Mapping[str, list[float]], words: Mapping[str, float], single: float | None) -> None:
-        """Refuse words that nothing in their line reads."""
-        said = codes["M"] or single == 4 or any(KINDS[code] in ("told", "system") for code in codes["G"])
-        if not (said or self.cycle) and ("Q" in words or ("P" in words and self.motion not in (2, 3))):
-            raise InputError(
-                "block", f"{'Q' if 'Q' in words else 'P'} that nothing reads", "P and Q beside G4, G64, cycles or an M word, P in arcs"
-            )
-        if "L" in words and not self.cycle:
-            raise InputError("block", "L", "it in cycles, where it repeats holes")
-        if not words.keys().isdisjoint(_CORNERS) and (self.motion != 1 or self.cycle or not {"X", "Y", "Z"} & words.keys()):
-            raise InputError("block", "a corner without a straight move", ",R and ,C in moves by G1")
 
     def _set(self, told: Mapping[str, float], codes: Mapping[str, list[float]], words: Mapping[str, float]) -> None:
         if "unit" in told:
@@ -314,7 +300,7 @@ class _Program:
                 self._add(target, RAPID, number)
         elif arc:
             self._arc(target, offsets, words, number)
-        elif self.corner or not words.keys().isdisjoint(_CORNERS):
+        elif self.corner or not words.keys().isdisjoint(CORNERS):
             self._straight(target, words, number)
         else:
             self._add(target, self.feed, number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from gcodeparser import parse_parameters
 
@@ -56,6 +57,9 @@ _SUBPROGRAMS = (96, 97, 98, 99)
 _LETTERS = "XYZIJKRFSTHDPQL"
 #: Axes that a program may name as long as they stand at 0.
 ROTARY = "ABC"
+#: Words of corners, and those that have to belong to something in their line.
+CORNERS = (",R", ",C")
+FURTHER = ("P", "Q", "L", *CORNERS)
 
 
 def block_of(line: str) -> str:
@@ -122,3 +126,27 @@ def words_of(block: str) -> tuple[dict[str, list[float]], dict[str, float], dict
         told,
         {letter: float(value) for letter, value in found.items()} | {f",{letter}": float(value) for letter, value in corners},
     )
+
+
+def check_further(
+    codes: Mapping[str, list[float]], words: Mapping[str, float], single: float | None, motion: float | None, cycle: bool
+) -> None:
+    """Refuse words of `FURTHER` that nothing in their line reads.
+
+    Parameters
+    ----------
+    codes, words : mapping
+        Of the line, as `words_of` returns them.
+    single, motion : float or None
+        Code of the line that acts in it alone, and the motion that stands.
+    cycle : bool
+        Whether a canned cycle stands.
+    """
+    said = codes["M"] or single == 4 or any(KINDS[code] in ("told", "system") for code in codes["G"])
+    if not (said or cycle) and ("Q" in words or ("P" in words and motion not in (2, 3))):
+        found = f"{'Q' if 'Q' in words else 'P'} that nothing reads"
+        raise InputError("block", found, "P and Q beside G4, G64, cycles or an M word, P in arcs")
+    if "L" in words and not cycle:
+        raise InputError("block", "L", "it in cycles, where it repeats holes")
+    if not words.keys().isdisjoint(CORNERS) and (motion != 1 or cycle or words.keys().isdisjoint("XYZ")):
+        raise InputError("block", "a corner without a straight move", ",R and ,C in moves by G1")
