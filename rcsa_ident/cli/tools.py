@@ -21,7 +21,9 @@ _ASSUMED = "What the library does not state"
 
 @answers
 def import_tools(
-    library: Annotated[Path, typer.Argument(help="Tool library of Fusion 360 or HSM: .json, or .tools with it.", show_default=False)],
+    library: Annotated[
+        Path, typer.Argument(help="Tool library of Fusion 360 or HSM: .json, .tools with it, or .hsmlib.", show_default=False)
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Folder for one TOOLING.toml per tool; created if it is missing.", show_default=False)
     ] = None,

@@ -1,4 +1,4 @@
-"""Tool libraries of Fusion 360 and HSM: plain JSON, or that JSON in a zip container (.tools), become toolings.
+"""Tool libraries of Fusion 360 and HSM become toolings: plain JSON, that JSON in a zip container (.tools), or XML (.hsmlib).
 
 An entry may also hold the properties of ISO 13399 by their names, as makers print them: DC, RE, KAPR, APMX, ZEFP and so on.
 
@@ -22,6 +22,7 @@ from rcsa_ident.cutting.outlines import key_of, missing
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.hsm_libraries import hsm_entries
 from rcsa_ident.io.library_entries import plain_entry, preset_notes
 from rcsa_ident.io.library_shapes import NotRead, check_type, iso_geometry, iso_shape_keys, shape_keys
 from rcsa_ident.io.setups import tooling_of
@@ -214,6 +215,8 @@ def _content(raw: bytes, where: str) -> Any:
     """The JSON of a library, out of its container where it is in one."""
     if raw[:4] == b"PK\x03\x04":
         raw = _unpacked(raw, where)
+    if raw[:200].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
+        return hsm_entries(raw, where)
 
     def refuse(text: str) -> NoReturn:
         raise InputError("tool library", text, "finite numbers", where)

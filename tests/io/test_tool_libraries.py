@@ -236,6 +236,45 @@ def test_a_text_that_is_no_number_is_refused_by_its_words(told):
     assert "geometry.DC: found" in found.reason
 
 
+HSM = """<?xml version="1.0" encoding="UTF-8"?>
+<tool-library version="1.7" xmlns="http://example.org/toollibrary">
+ <tool guid="{1}" type="bull nose end mill" unit="inches" version="1.4">
+  <description>half inch, R 0.03</description>
+  <material name="carbide"/>
+  <body diameter="0.5" number-of-flutes="3" corner-radius="0.03" flute-length="1" overall-length="3" shaft-diameter="0.5"/>
+  <holder><section diameter="1" length="2"/></holder>
+  <motion spindle-rpm="9000" cutting-feedrate="60"/>
+ </tool>
+ <tool type="drill" unit="millimeters"><description>drill</description><body diameter="5"/></tool>
+</tool-library>
+"""
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_xml_of_hsmworks(encoding):
+    cutter, drill = import_tools(HSM.encode(encoding), "L.hsmlib")
+    assert drill.reason == "a drill, not a milling tool"
+    assert (cutter.name, cutter.tooling.cutter.teeth) == ("half inch, R 0.03", 3)
+    assert 1e3 * cutter.tooling.cutter.diameter == pytest.approx(12.7, rel=1e-12)
+    assert 1e3 * cutter.tooling.cutter.corner_radius == pytest.approx(0.762, rel=1e-12)
+    assert "preset of the library, where an advice may start: 9000 rev/min, 1524 mm/min" in cutter.notes
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda text: text[:300], "XML that cannot be read"),
+        (lambda text: text.replace("<tool-library", '<!DOCTYPE a [<!ENTITY b "c">]><tool-library'), "a document type"),
+        (lambda text: "<html></html>", "no list of tools"),
+    ],
+)
+def test_xml_that_is_no_library_is_refused(spoil, words):
+    with pytest.raises(InputError, match=words):
+        import_tools(spoil(HSM).encode(), "L.hsmlib")
+    with pytest.raises(InputError):
+        import_tools(spoil(HSM).encode("utf-16-le"), "L.hsmlib")
+
+
 def test_presets_are_where_an_advice_may_start():
     presets = [{"name": "Aluminium", "n": 12000, "f_z": 0.05, "v_f": "2400 mm", "stepdown": 2.0}, {"name": "empty"}, "no preset"]
     metric = only(end_mill() | {"start-values": {"presets": presets}})
