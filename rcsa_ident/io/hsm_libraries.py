@@ -34,8 +34,9 @@ def hsm_entries(raw: bytes, where: str) -> list[dict[str, Any]]:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError("tool library", "bytes that are not text", "XML in UTF-8", where) from None
-    if "<!doctype" in text.lower() or "<!entity" in text.lower():
-        raise InputError("tool library", "a document type", "XML without declarations of its own", where)
+    # with zeros between its signs a declaration would not be found
+    if "\0" in text or "<!doctype" in text.lower() or "<!entity" in text.lower():
+        raise InputError("tool library", "a document type, or binary data", "XML without declarations of its own", where)
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
