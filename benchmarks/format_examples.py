@@ -248,6 +248,18 @@ def _recordings(folder: Path) -> None:
     for suffix, (delimiter, decimal) in TABLES.items():
         lines = [line.replace(".", decimal).replace(";", delimiter) for line in (*head[2:], *motion)]
         (folder / f"logger{suffix}").write_text("\n".join([*head[:2], *lines]) + "\n", encoding="utf-8")
+    labview = [
+        "LabVIEW Measurement",
+        "Separator\tTab",
+        "X_Columns\tNo",
+        "***End_of_Header***",
+        "",
+        "Channels\t2",
+        "Y_Unit_Label\tum\tm/s^2",
+    ]
+    labview += [f"Delta_X\t{1.0 / rate!r}\t{1.0 / rate!r}", "***End_of_Header***", "X_Value\tflange_x\tfixture_x\tComment"]
+    labview += ["\t" + line.replace(";", "\t") for line in motion]
+    (folder / "logger.lvm").write_text("\n".join(labview) + "\n", encoding="utf-8")
 
 
 def _sounds(folder: Path) -> None:

@@ -16,7 +16,7 @@ from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.verdict import RecordCode
 
 #: Tables of text.
-TEXT = (".csv", ".txt", ".dat", ".tsv", ".asc")
+TEXT = (".csv", ".txt", ".dat", ".tsv", ".asc", ".lvm")
 #: Formats whose readers list a file's channels.
 _LISTING = {
     ".h5": "hdf5",

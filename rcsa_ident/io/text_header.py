@@ -23,7 +23,7 @@ DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 #: ``name (unit)`` and ``name [unit]``; ``name in unit``, ``name / unit`` and ``name, unit`` where the unit is a known one.
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
-_DIVIDED = re.compile(r"^(?P<name>.+?)(?:\s+in\s+|\s*/\s+|\s*,\s+)(?P<unit>[^,]+)$")
+_DIVIDED = re.compile(r"^(?P<name>.*?)(?:(?:^|\s+)in\s+|\s*/\s+|\s*,\s+)(?P<unit>[^,]+)$")
 #: Units in words, as oscilloscopes write them.
 _WORDS = {"volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV", "newton": "N", "newtons": "N"}
 #: What a column of sample numbers is called.
@@ -37,6 +37,7 @@ _TIME_UNITS = ("horizontal units", "horizontal unit", "x_unit_label", "x units",
 #: Names behind the last column of numbers: of remarks, which stay empty, and of a first time and a step, whose values stand below.
 _BEHIND = ("comment", "comments", "remark", "remarks", "note", "notes", "kommentar", "start", "increment", "")
 _RATE = (
+    r"fr[ée]quence d.[ée]chantillonnage|fre[qc]uen\w+ d[ei] (?:campionamento|muestreo)|tasa de muestreo|"
     r"(?:sampl\w*|abtast\w*|scan|acquisition|frame)[ _-]*(?:rate|freq\w*\.?)|abtast(?:rate|freq\w*)"
     r"|sampl\w*[ _]*(?:per|/)[ _]*s(?:ec(?:ond)?)?|fs"
 )
@@ -57,7 +58,7 @@ _BETWEEN = re.compile(
 )
 _HERTZ = {
     **dict.fromkeys(("hz", "s/s", "sa/s", "samples/s", "samples/sec", "samples/second", "sps", "1/s", "s-1", "s^-1", "hertz"), 1.0),
-    **dict.fromkeys(("khz", "ks/s", "ksa/s", "ksamples/s", "ksps"), 1e3),
+    **dict.fromkeys(("khz", "k", "ks/s", "ksa/s", "ksamples/s", "ksps"), 1e3),
     **dict.fromkeys(("mhz", "ms/s", "msa/s", "msamples/s", "msps"), 1e6),
 }
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:([,.' \u00a0\u202f])\d{3})(?:\1\d{3})*(?![\d])")
@@ -91,9 +92,8 @@ class Head:
 
     @property
     def times(self) -> list[int]:
-        """Return the places of columns of times: by their names, or the first column by its unit."""
-        told = [i for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True)) if time_unit(name, unit) is not None]
-        return told or ([0] if self.units[0] and seconds_per(self.units[0]) is not None else [])
+        """Return the places of columns of times."""
+        return times_of(self.names, self.units)
 
     @property
     def counts(self) -> list[int]:
@@ -182,6 +182,12 @@ def columns_of(texts: Sequence[str], units: Sequence[str], known: Known) -> tupl
     return (list(texts) if len(set(names)) < len(set(texts)) else names), told
 
 
+def times_of(names: Sequence[str], units: Sequence[str]) -> list[int]:
+    """Return the places of columns of times: by their names, or the first column by its unit."""
+    told = [i for i, (name, unit) in enumerate(zip(names, units, strict=True)) if time_unit(name, unit) is not None]
+    return told or ([0] if units and units[0] and seconds_per(units[0]) is not None else [])
+
+
 def tells_rate(line: str) -> bool:
     """Return whether a line speaks of a rate or an interval of samples."""
     return _TOLD.search(line) is not None
@@ -207,8 +213,8 @@ def name_and_unit(text: str, known: Known) -> tuple[str, str]:
     if found and re.search(r"[^\W\d_]|[%°-]", found["unit"]):
         return found["name"].strip() or found["unit"].strip(), found["unit"].strip()
     found = _DIVIDED.match(text)
-    if found and known(found["unit"].strip()):
-        return found["name"].strip(), found["unit"].strip()
+    if found and (known(found["unit"].strip()) or seconds_per(found["unit"]) is not None):
+        return (found["name"] or text).strip(), found["unit"].strip()
     return text, ""
 
 

@@ -16,7 +16,7 @@ from rcsa_ident.io.channels import VOLTAGES, Channel, Signals, StoredChannel, th
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.frf_files import FORCES, MOTIONS
 from rcsa_ident.io.text_columns import LARGEST_TEXT, Meant, decoded
-from rcsa_ident.io.text_header import Head, columns_of, read_head, split, tells_rate
+from rcsa_ident.io.text_header import Head, columns_of, read_head, split, tells_rate, times_of
 from rcsa_ident.io.text_rows import STAMP, beside, first_numbers, lines_of, numbers_of, rows_of
 from rcsa_ident.io.time_base import UNITS_OF_TIME, Irregular, seconds_per, time_unit, uniform
 from rcsa_ident.io.validated_table import listed
@@ -130,7 +130,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         own, every = columns_of(header, [""] * len(header), known_unit)
         places = [_place(name, own, header, str(path)) for name in names]
         units[:] = [every[i] for i in places]
-        times = [i for i in range(len(header)) if i not in places and time_unit(own[i], every[i]) is not None]
+        times = [i for i in times_of(own, every) if i not in places]
         if len(times) > 1:
             raise InputError("time", f"columns {' and '.join(header[i] for i in times)}", "one time column", str(path))
         seconds = [_seconds(own[i], every[i], notes, str(path)) for i in times]
@@ -189,8 +189,7 @@ def _tells_more(path: Path) -> bool:
     unlike = len({line.count(delimiter) for line in text.splitlines()[start - 1 : start + 1]}) > 1
     cells = split(head[-1], delimiter) if head else []
     names, units = columns_of(cells, [""] * len(cells), known_unit)
-    times = sum(time_unit(name, unit) is not None for name, unit in zip(names, units, strict=True))
-    return unlike or times > 1 or any(STAMP.fullmatch(cell) for cell in split(lines[start], delimiter))
+    return unlike or len(times_of(names, units)) > 1 or any(STAMP.fullmatch(cell) for cell in split(lines[start], delimiter))
 
 
 def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = ()) -> OpenRecording:
