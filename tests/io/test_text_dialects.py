@@ -337,6 +337,14 @@ def test_whole_numbers_in_front_hide_no_decimal_comma(tmp_path):
     assert [each.samples.tolist() for each in open_recording(path).channels] == [[0.0, G, 0.5 * G, 2.0 * G], [1.0, 2.0, 3.0, 4.5]]
 
 
+def test_equal_rows_are_kept_with_a_decimal_comma_as_well(tmp_path):
+    """Found by fuzzing: a row above the table by itself was taken for a header that comes again, and none was left."""
+    path = tmp_path / "record.txt"
+    path.write_text("a;b;c\n0,002;1,7;2\nnote\n0,002;1,7;2\n0,002;1,7;2\n0,003;1,8;3\n")
+    found = open_recording(path, default_rate=1000.0)
+    assert [each.samples.tolist() for each in found.channels] == [[0.002, 0.002, 0.003], [1.7, 1.7, 1.8], [2.0, 2.0, 3.0]]
+
+
 def test_empty_cells_are_lost_samples_and_no_row_goes(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("Time (s),acc (m/s²),slow (N)\n0,1,\n0.001,2,\n0.002,3,7\n0.003,,8\n")
