@@ -200,7 +200,16 @@ N100 M30
 %
 """
 #: Forms that a program's suffixes stand for: the words are the same.
-PROGRAMS = {".nc": _PROGRAM, ".tap": _PROGRAM.lower(), ".ngc": _PROGRAM.replace("(", "; (", 3), ".gcode": _PROGRAM.replace("%\n", "")}
+PROGRAMS = {
+    ".nc": _PROGRAM,
+    ".tap": _PROGRAM.lower(),
+    ".ngc": _PROGRAM.replace("(", "; (", 3),
+    ".gcode": _PROGRAM.replace("%\n", ""),
+    ".mpf": _PROGRAM.replace("%\n", "").replace("I0. J4.", "CR=4."),
+    ".eia": _PROGRAM.replace("G21 G90 G94 G17", "G0 G17 G21 G40 G49 G80 G90 G94"),
+    ".cnc": _PROGRAM.replace("N10 ", "G05 P10000\nN10 ").replace("X-10. Y6. Z5.", "X-10. Y6. Z5. A0."),
+    ".txt": _PROGRAM.replace("\n", "\r\n"),
+}
 
 
 def receptance(frequency: np.ndarray, shift: float = 1.0) -> np.ndarray:
@@ -239,6 +248,18 @@ def _recordings(folder: Path) -> None:
     for suffix, (delimiter, decimal) in TABLES.items():
         lines = [line.replace(".", decimal).replace(";", delimiter) for line in (*head[2:], *motion)]
         (folder / f"logger{suffix}").write_text("\n".join([*head[:2], *lines]) + "\n", encoding="utf-8")
+    labview = [
+        "LabVIEW Measurement",
+        "Separator\tTab",
+        "X_Columns\tNo",
+        "***End_of_Header***",
+        "",
+        "Channels\t2",
+        "Y_Unit_Label\tum\tm/s^2",
+    ]
+    labview += [f"Delta_X\t{1.0 / rate!r}\t{1.0 / rate!r}", "***End_of_Header***", "X_Value\tflange_x\tfixture_x\tComment"]
+    labview += ["\t" + line.replace(";", "\t") for line in motion]
+    (folder / "logger.lvm").write_text("\n".join(labview) + "\n", encoding="utf-8")
 
 
 def _sounds(folder: Path) -> None:

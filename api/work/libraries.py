@@ -8,9 +8,12 @@ from dataclasses import replace
 from api.work.toolings import tooling_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.tool_libraries import Assumptions, import_tools
+from rcsa_ident.machining_setup import BareCutter
 
 #: Largest library [bytes], and most entries in one.
 LARGEST_LIBRARY, MOST_TOOLS = 8_000_000, 2000
+#: The service keeps whole toolings.
+_ALONE = "a cutter without a holder: name one of the library's holders, or send [cutter] beside the modes or FRFs of its tip"
 
 
 def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[tuple[str, str, tuple[str, ...], str]]:
@@ -31,7 +34,8 @@ def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[
         assumptions = replace(assumptions, contact=known.assembly.contact, spread=known.spread)
     entries = import_tools(raw, "", assumptions, MOST_TOOLS)
     names = library_names([entry.name for entry in entries])
-    return [(name, entry.text, entry.notes, entry.reason) for name, entry in zip(names, entries, strict=True)]
+    told = zip(names, entries, strict=True)
+    return [(name, entry.text, entry.notes, entry.reason or _ALONE * isinstance(entry.tooling, BareCutter)) for name, entry in told]
 
 
 def library_names(names: list[str]) -> list[str]:

@@ -289,6 +289,6 @@ def _milled(change: ToolChange, path: ToolPath, field: DexelField, request: Path
     shown, row = thinned(columns, -found.peak_force)
     turns = ToolPath(np.stack([begins, found.places], axis=1).reshape(-1, 3)) if found.time.size else path
     part = part_of(field, turns, 2 * np.arange(found.time.size), row, solid_of(change.tooling).radius)
-    warnings = [*path.remarks, *found.warnings, *change.tooling.remarks, *change.machine.remarks]
+    warnings = [*path.remarks, *field.remarks, *found.warnings, *change.tooling.remarks, *change.machine.remarks]
     said = {"status": found.status, "sentences": sentences_of(found.described(path)), "warnings": list(dict.fromkeys(warnings))}
     return said | {"rows": int(found.time.size), "columns": shown, "part": part}, table

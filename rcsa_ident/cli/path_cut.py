@@ -146,7 +146,7 @@ def mill(
     write_columns(out, milling_columns(found, path))
     if surface is not None:
         write_columns(surface, _surface_columns(found, path))
-    warnings = list(dict.fromkeys([*path.remarks, *tooling.remarks, *machine.remarks, *found.warnings]))
+    warnings = list(dict.fromkeys([*path.remarks, *field.remarks, *tooling.remarks, *machine.remarks, *found.warnings]))
     if json_:
         emit(_mill_summary(found, path) | {"warnings": warnings, "seconds": stages.seconds, "out": str(out)})
         return

@@ -21,7 +21,9 @@ _ASSUMED = "What the library does not state"
 
 @answers
 def import_tools(
-    library: Annotated[Path, typer.Argument(help="Tool library of Fusion 360 or HSM: .json, or .tools with it.", show_default=False)],
+    library: Annotated[
+        Path, typer.Argument(help="Tool library of Fusion 360 or HSM: .json, .tools with it, or .hsmlib.", show_default=False)
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Folder for one TOOLING.toml per tool; created if it is missing.", show_default=False)
     ] = None,
@@ -204,6 +206,7 @@ def _show(entries: list[Imported]) -> None:
     from rich.table import Table
 
     from rcsa_ident.cli.tables import show
+    from rcsa_ident.machining_setup import BareCutter
 
     table = Table()
     for title in ("no.", "tool", "type", "teeth", "Ø mm", "stickout + insertion mm", ""):
@@ -211,8 +214,10 @@ def _show(entries: list[Imported]) -> None:
     for entry in entries:
         shape = ["", "", ""]
         if entry.tooling is not None:
-            cutter, assembly = entry.tooling.cutter, entry.tooling.assembly
-            shape = [str(cutter.teeth), f"{1e3 * cutter.diameter:.4g}", f"{1e3 * assembly.stickout:.4g} + {1e3 * assembly.insertion:.4g}"]
+            cutter, lengths = entry.tooling.cutter, "cutter alone"
+            if not isinstance(entry.tooling, BareCutter):
+                lengths = f"{1e3 * entry.tooling.assembly.stickout:.4g} + {1e3 * entry.tooling.assembly.insertion:.4g}"
+            shape = [str(cutter.teeth), f"{1e3 * cutter.diameter:.4g}", lengths]
         last = entry.reason or f"{len(entry.notes)} assumptions"
         table.add_row(str(entry.number), *(escape(text) for text in (entry.name, entry.kind, *shape, last)))
     show(table)

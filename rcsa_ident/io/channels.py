@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import tempfile
 import weakref
 from collections.abc import Callable, Sequence
@@ -14,13 +15,14 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE
-from rcsa_ident.io.time_base import uniform
+from rcsa_ident.io.time_base import seconds_per, uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import LONGEST, Quantity
 
 RATE = "sampling_rate_hz"
-TIME_COLUMNS = ("time", "time_s")
+#: Columns of times in files of columns with names and nothing else: ``time`` in seconds, or with its unit behind.
+_TIME = re.compile(r"(?:time|t(?=_))(?:_(?P<unit>s|ms|us|ns))?", re.IGNORECASE)
 #: Of a file that is read as a whole, and of its channels as float64.
 LARGEST_FILE = 512 * MEGABYTE
 LARGEST_DATA = 512 * MEGABYTE
@@ -230,6 +232,16 @@ def placed(time: FloatArray, channels: Sequence[Channel], expected: float | None
         full[index] = values[:]
         padded.append(full)
     return rate, padded
+
+
+def time_scale(name: str) -> float | None:
+    """Return the seconds per unit of a column of times by its name alone; None of another column.
+
+    >>> time_scale("time"), time_scale("time_ms"), time_scale("t")
+    (1.0, 0.001, None)
+    """
+    found = _TIME.fullmatch(name)
+    return seconds_per(found["unit"] or "") if found else None
 
 
 def lacks(what: str, package: str, extra: str, where: str) -> InputError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -14,9 +15,11 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
-from rcsa_ident.io.gcode_blocks import KINDS, block_of, words_of
+from rcsa_ident.io.gcode_blocks import CORNERS, FURTHER, KINDS, ROTARY, block_of, check_further, words_of
+from rcsa_ident.io.gcode_cycles import MOST_REPEATS, Corner, Cycle
 from rcsa_ident.io.text_columns import decoded
-from rcsa_ident.signals.verdict import assumed
+from rcsa_ident.remarks import Remark
+from rcsa_ident.signals.verdict import RecordCode, assumed
 from rcsa_ident.toolpath.arcs import centre_of, chord_count, chords, turned
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from rcsa_ident.units import from_rpm, to_rpm
@@ -32,16 +35,19 @@ _ENDS, _BEHIND = (2, 30), (0, 1, 5, 9, 60)
 
 _PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 _AXES, _OFFSETS = "XYZ", "IJK"
+_HEIDENHAIN = re.compile(r"^\s*\d*\s*BEGIN PGM", re.MULTILINE | re.IGNORECASE)
+_PECKED = "G83 comes back to the depth that it has drilled: the control's own clearance is taken for 0"
+_LEFT = "the program ends in line {}: line {} and those behind it are not read"
 
 
 def read_gcode(path: str | Path, tolerance: float = 1e-6) -> ToolPath:
     """Return the path of a program's tool tip.
 
-    G0 to G3 (arcs by I, J, K or R, full circles, helices) in the planes of G17 to G19, millimetres or inches, absolute or incremental,
-    with F, S, T, M3 to M6. M2 and M30 end it. The first place is where all axes are told, whatever moved before; a program begins at its
-    zero where its first feed move needs a place that nobody told. G28, G30 and G53 lead where nobody knows: Z stands from there on at the
-    highest that the program tells anywhere, X and Y where they were, until they are told next; a rapid move that tells Z again goes across
-    first, then down.
+    G0 to G3 (arcs by I, J, K or R, full circles, helices of several turns) in the planes of G17 to G19, millimetres or inches, absolute or
+    incremental, with F, S, T, M3 to M6, canned cycles and rounded corners. M2, M30 and ``%`` end it; what stands behind is remarked. The
+    first place is where all axes are told, whatever moved before; a program begins at its zero where its first feed move needs a place that
+    nobody told. G28, G30 and G53 lead where nobody knows: Z stands from there on at the highest that the program tells anywhere, X and Y
+    where they were, until they are told next; a rapid move that tells Z again goes across first, then down.
 
     Parameters
     ----------
@@ -52,8 +58,8 @@ def read_gcode(path: str | Path, tolerance: float = 1e-6) -> ToolPath:
     Raises
     ------
     InputError
-        Names file and line, for all that would change the path and is not understood: radius correction, canned cycles, macros,
-        subprograms, further axes, a change of the work coordinates.
+        Names file and line, for all that would change the path and is not understood: radius correction, macros, subprograms,
+        further axes that move, a change of the work coordinates.
     """
     return gcode_of(decoded(read_bytes(path, "program", LARGEST_PROGRAM), "program", str(path)), str(path), tolerance)
 
@@ -67,18 +73,26 @@ def gcode_of(text: str, where: str, tolerance: float = 1e-6) -> ToolPath:
     >>> path.length, path.line.tolist()
     (0.12, [1, 2, 3])
     """
+    if _HEIDENHAIN.search(text[:1000]):
+        raise InputError("program", "a program in Heidenhain's plain text", "G-code: the CAM system writes it for DIN/ISO", where)
     program = _Program(positive("tolerance", tolerance, "m"))
+    ended = 0
     for number, block in _blocks(text, where):
         try:
-            if program.run(block, number):
+            if block == "%" or program.run(block, number):
+                ended = number
                 break
         except InputError as error:
             raise error.at(f"{where} line {number}") from None
+    if ended:
+        behind = next((i for i, line in enumerate(io.StringIO(text), start=1) if i > ended and line.strip(" \t\r\n%")), 0)
+        if behind:
+            program.remarks.append(Remark(RecordCode.ASSUMED, _LEFT.format(ended, behind)))
     return program.path(where)
 
 
 def _blocks(text: str, where: str) -> Iterator[tuple[int, str]]:
-    """Number and words of each line that says something, up to the tape's end."""
+    """Number and words of each line that says something, and the ``%`` that ends the tape."""
     begun = False
     for number, line in enumerate(io.StringIO(text), start=1):
         try:
@@ -87,12 +101,11 @@ def _blocks(text: str, where: str) -> Iterator[tuple[int, str]]:
             block = block_of(line)
         except InputError as error:
             raise error.at(f"{where} line {number}") from None
-        if block == "%":
-            if begun:
-                return
-        elif block:
+        if block and (begun or block != "%"):
             begun = True
             yield number, block
+            if block == "%":
+                return
 
 
 class Kept(NamedTuple):
@@ -122,16 +135,21 @@ def kept_words(path: str | Path) -> tuple[list[Kept], list[int]]:
     path : path
         Of a program that `read_gcode` reads.
     """
-    kept, led, unit = [], [], 1.0
+    kept, led, unit, cycle = [], [], 1.0, False
     for number, block in _blocks(decoded(read_bytes(path, "program", LARGEST_PROGRAM), "program", str(path)), str(path)):
+        if block == "%":
+            break
         codes, told, words = words_of(block)
+        cycle = told["cycle"] != 80 if "cycle" in told else cycle and "motion" not in told
         unit = {20.0: _INCH, 21.0: 1.0}.get(told.get("unit", 0.0), unit)
         if told.get("single") in (28, 30, 53):
             led.append(number)
         said = [f"G{code:g}" for code in codes["G"] if KINDS[code] in ("told", "system") or code in (4, 80)]
         # tolerances are lengths, further numbers are none
         size = unit if 64 in codes["G"] or 61 in codes["G"] else 1.0
-        letters = "XPSF" if told.get("single") == 4 else "HDPQST"
+        # P and Q belong to what is said, or to moves: to cycles and turns of arcs
+        spoken = not cycle and bool(codes["M"] or set(said) - {"G80"})
+        letters = "XPSF" if told.get("single") == 4 else "XYZRPQ" if 5.1 in codes["G"] else "HDPQEST" if spoken else "HDST"
         numbers = [f"{letter}{_told(words[letter] * (size if letter in 'PQ' else 1.0))}" for letter in letters if letter in words]
         machine = [code for code in codes["M"] if code not in _ENDS]
         before, after = ([f"M{code:g}" for code in machine if (code in _BEHIND) == late] for late in (False, True))
@@ -159,9 +177,13 @@ class _Program:
         self.lost: dict[int, int] = {}
         self.highest = -math.inf
         self.motion: float | None = None
+        self.cycle: Cycle | None = None
+        self.to_initial = True
+        self.corner: Corner | None = None
+        self.remarks: list[Remark] = []
         self.plane, self.unit, self.unit_told = 17.0, 1.0, False
         self.absolute, self.absolute_centres = True, False
-        self.system: float | None = None
+        self.system = ""
         self.feed, self.speed, self.turning = math.nan, math.nan, True
         self.selected, self.mounted, self.changes = 0, 0, False
         self.places, self.feeds, self.speeds = array("d"), array("d"), array("d")
@@ -174,14 +196,24 @@ class _Program:
         single = told.get("single")
         axes = {i: words[letter] * self.unit for i, letter in enumerate(_AXES) if letter in words}
         offsets = {i: words[letter] * self.unit for i, letter in enumerate(_OFFSETS) if letter in words}
+        if not words.keys().isdisjoint(FURTHER):
+            check_further(codes, words, single, self.motion, self.cycle is not None)
+        if self.corner and (single in (28, 30, 53) or self.cycle or set(_ENDS) & set(codes["M"])):
+            raise self.corner.refused("no move behind it", "two moves")
         if single in (28, 30):
-            self._home(axes, number)
+            # of a rotary axis alone it moves no other
+            if axes or not words.keys() & set(ROTARY):
+                self._home(axes, number)
         elif single == 53:
             if self.motion != 0:
                 raise InputError("block", "G53 at a feed", "G53 G0: where it leads nobody told")
             self._leave(axes, number)
+        elif 5.1 in codes["G"]:  # its axes are those that are smoothed
+            pass
+        elif self.cycle and (axes or "R" in words):
+            self._drill(self.cycle, axes, words, number)
         elif single != 4 and (axes or offsets or "R" in words):
-            self._move(axes, offsets, words.get("R"), number)
+            self._move(axes, offsets, words, number)
         if 5 in codes["M"]:
             self.turning = False
         return bool(set(_ENDS) & set(codes["M"]))
@@ -192,12 +224,21 @@ class _Program:
         self.plane = told.get("plane", self.plane)
         self.absolute = told.get("distance", 90 if self.absolute else 91) == 90
         self.absolute_centres = told.get("centre", 90.1 if self.absolute_centres else 91.1) == 90.1
-        if "motion" in told:
-            self.motion = None if told["motion"] == 80 else told["motion"]
-        if (system := told.get("system")) is not None:
-            if self.system not in (None, system):
+        if told.get("cycle", 80) != 80:
+            if "motion" in told:
+                raise InputError("block", f"G{told['motion']:g} and G{told['cycle']:g}", "one of them in a line")
+            self.cycle = Cycle(int(told["cycle"]), self.cycle.initial if self.cycle else self.at[2])
+        elif "cycle" in told or "motion" in told:
+            self.cycle = None
+        if "motion" in told or "cycle" in told:
+            self.motion = told.get("motion")
+        if 98 in codes["G"] or 99 in codes["G"]:
+            self.to_initial = 98 in codes["G"]
+        if "system" in told:
+            system = f"G{told['system']:g}{' P' + format(words['P'], 'g') if 'P' in words else ''}"
+            if self.system not in ("", system):
                 raise InputError(
-                    "block", f"G{system:g} after G{self.system:g}", "one system of work coordinates: nobody told how far they are apart"
+                    "block", f"{system} after {self.system}", "one system of work coordinates: nobody told how far they are apart"
                 )
             self.system = system
         if told.get("single") == 4:  # its words are a time
@@ -217,10 +258,35 @@ class _Program:
         if 3 in codes["M"] or 4 in codes["M"]:
             self.turning = True
 
-    def _move(self, axes: dict[int, float], offsets: dict[int, float], radius: float | None, number: int) -> None:
+    def _drill(self, cycle: Cycle, axes: dict[int, float], words: Mapping[str, float], number: int) -> None:
+        """Holes of a canned cycle: one a line, or as many as K or L says."""
+        if self.plane != 17 or {"I", "J"} & words.keys():
+            raise InputError("cycle", f"G{cycle.code} in another plane, or with I or J", "cycles along Z, G17")
+        repeats = words.get("K", words.get("L", 1.0))
+        if not (0 <= repeats <= MOST_REPEATS and repeats == int(repeats)):
+            raise InputError("K or L", repeats, f"how many holes, a whole number up to {MOST_REPEATS}")
+        if self.lost or not self.lines:
+            raise InputError("cycle", f"G{cycle.code} from a place that nobody told", "X, Y and Z told by G0 before it")
+        if cycle.code == 83 and all(note != _PECKED for note in self.remarks):
+            self.remarks.append(Remark(RecordCode.ASSUMED, _PECKED))
+        z, r, q = (words[letter] * self.unit if letter in words else None for letter in "ZRQ")
+        cycle.told(z, r, q, self.absolute)
+        across = {i: value for i, value in axes.items() if i != 2}
+        self.highest = max(self.highest, cycle.clearance)
+        for _ in range(int(repeats)):
+            x, y, _ = self._target(across)
+            for place, rapid in cycle.hole(self.at, x, y, self.to_initial):
+                if place != self.at:
+                    self._add(place, RAPID if rapid else self.feed, number)
+                    self.at = place
+
+    def _move(self, axes: dict[int, float], offsets: dict[int, float], words: Mapping[str, float], number: int) -> None:
+        radius = words.get("R")
         if self.motion is None:
             raise InputError("block", "axes without a motion", "one of G0 to G3 before them")
         arc = self.motion in (2, 3)
+        if self.corner and self.motion != 1:
+            raise self.corner.refused(f"G{self.motion:g} behind it", "two moves")
         if not arc and (offsets or radius is not None):
             raise InputError("block", f"I, J, K or R in G{self.motion:g}", "them in arcs, G2 and G3")
         if self.motion != 0:
@@ -233,12 +299,28 @@ class _Program:
             if self.lines or not any(map(math.isnan, target)):
                 self._add(target, RAPID, number)
         elif arc:
-            self._arc(target, offsets, radius, number)
+            self._arc(target, offsets, words, number)
+        elif self.corner or not words.keys().isdisjoint(CORNERS):
+            self._straight(target, words, number)
         else:
             self._add(target, self.feed, number)
         self.at = target
         for i in axes:
             self.lost.pop(i, None)
+
+    def _straight(self, target: list[float], words: Mapping[str, float], number: int) -> None:
+        """A feed move on a straight line, by the corner that waits for it; its own corner waits for the next one."""
+        start = self.at
+        if self.corner:
+            for place in self.corner.places(target, _PLANES[int(self.plane)], self.tolerance):
+                self._add(place, self.corner.feed, self.corner.number)
+                start = place
+            self.corner = None
+        for kind in "RC":
+            if f",{kind}" in words:
+                self.corner = Corner(kind, positive(f",{kind}", words[f",{kind}"] * self.unit, "mm"), start, target, self.feed, number)
+                return
+        self._add(target, self.feed, number)
 
     def _begin(self, axes: dict[int, float], arc: bool, number: int) -> None:
         """See to it that a feed move begins somewhere."""
@@ -264,7 +346,10 @@ class _Program:
             self.highest = max(self.highest, target[2])
         return target
 
-    def _arc(self, target: list[float], offsets: dict[int, float], radius: float | None, number: int) -> None:
+    def _arc(self, target: list[float], offsets: dict[int, float], words: Mapping[str, float], number: int) -> None:
+        radius, turns = words.get("R"), words.get("P", 1.0)
+        if not (1 <= turns <= MOST_PLACES and turns == int(turns)):
+            raise InputError("P", turns, "how many turns an arc takes, a whole number from 1 on")
         u, v, w = plane = _PLANES[int(self.plane)]
         start, end = (1e-3 * np.array(place) for place in (self.at, target))
         first, last = (start[u], start[v]), (end[u], end[v])
@@ -283,6 +368,7 @@ class _Program:
         else:
             centre = first[0] + 1e-3 * offsets.get(u, 0.0), first[1] + 1e-3 * offsets.get(v, 0.0)
         angle = turned(first, last, centre, clockwise)
+        angle += math.copysign(2.0 * math.pi * (turns - 1.0), angle)
         reach = max(math.hypot(p[0] - centre[0], p[1] - centre[1]) for p in (first, last))
         count = chord_count(reach, angle, self.tolerance)
         self._check(count)
@@ -324,6 +410,8 @@ class _Program:
 
     def path(self, where: str) -> ToolPath:
         """Return the places; where Z was led where nobody knows it stands at the highest that is told."""
+        if self.corner:
+            raise self.corner.refused("no move behind it", "two moves").at(where)
         if not self.lines:
             raise InputError("program", "no move to a place", "one or more, with X, Y and Z", where)
         places = np.array(self.places).reshape(-1, 3)
@@ -338,7 +426,7 @@ class _Program:
             speed=from_rpm(np.array(self.speeds)[kept]),
             tool=tools[kept],
             line=np.array(self.lines)[kept],
-            remarks=() if self.unit_told else (assumed("the program", "", "millimetres (G21)"),),
+            remarks=(*(() if self.unit_told else (assumed("the program", "", "millimetres (G21)"),)), *self.remarks),
         )
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from gcodeparser import parse_parameters
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.gcode_cycles import CYCLES
 
 #: Characters that a line may have.
 _LONGEST_LINE = 1000
@@ -15,24 +17,31 @@ _LARGEST_NUMBER = 1e7
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
 _WORDS = re.compile(rf"(?:[A-Z]{_NUMBER})*")
+_CORNER = re.compile(rf",([CR])({_NUMBER})")
+#: Words of Sinumerik: the radius of an arc, and its further turns.
+_RADIUS, _TURNS = re.compile(rf"CR=({_NUMBER})"), re.compile(r"TURN=(\d{1,6})")
 _CODES = re.compile(rf"([GM])({_NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 #: A point that no digit follows: the tokeniser takes it for a whole number and fails.
 _BARE_POINT = re.compile(r"\.(?!\d)")
+_MACRO = re.compile(r"[#\[\]=]")
 _LABEL = re.compile(r"[O:]\d+")
 _NUMBERED = re.compile(r"N\d+\.?")
 
 #: Codes by what they set; of one kind a line has one.
 _OF_A_KIND: dict[str, tuple[float, ...]] = {
-    "motion": (0, 1, 2, 3, 80),
+    "motion": (0, 1, 2, 3),
+    # a group of their own: G80 stands beside G0 in the first line of very many programs
+    "cycle": (80, *CYCLES),
     "plane": (17, 18, 19),
     "unit": (20, 21),
     "distance": (90, 91),
     "centre": (90.1, 91.1),
     "single": (4, 28, 30, 53),
-    "system": (54, 55, 56, 57, 58, 59),
-    # none of these moves a place: cancelled corrections, a tool's length, exact stops and smoothing, feed per minute, speed in rev/min
-    "told": (5.1, 9, 15, 40, 43, 49, 50, 61, 61.1, 62, 64, 69, 94, 97, 98, 99),
+    "system": (54, 54.1, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3, 154),
+    # none of these moves a place: cancelled corrections, a tool's length, look-ahead, exact stops and smoothing, feed per minute, speed in
+    # rev/min, how high a cycle comes back
+    "told": (5, 5.1, 8, 9, 15, 40, 43, 44, 49, 50, 61, 61.1, 62, 64, 69, 94, 97, 98, 99, 187),
 }
 KINDS = {code: kind for kind, codes in _OF_A_KIND.items() for code in codes}
 #: Why codes are refused that would change the path.
@@ -42,28 +51,39 @@ _REFUSED: dict[float, str] = {
     93: "feeds per minute, G94",
     95: "feeds per minute, G94",
     96: "speeds in rev/min, G97",
-    **dict.fromkeys((73, 74, 76, *range(81, 90)), "moves by G0 to G3 instead of canned cycles"),
+    87: "a cycle that bores from above: the control alone knows where the tool steps aside",
 }
 _SUBPROGRAMS = (96, 97, 98, 99)
-_LETTERS = "XYZIJKRFSTHDPQ"
+_LETTERS = "XYZIJKRFSTHDPQL"
+#: Axes that a program may name as long as they stand at 0.
+ROTARY = "ABC"
+#: Words of corners, and those that have to belong to something in their line.
+CORNERS = (",R", ",C")
+FURTHER = ("P", "Q", "L", *CORNERS)
 
 
 def block_of(line: str) -> str:
-    """Return a line without comments, blanks and its number; empty where it says nothing, ``%`` where it is the tape's end."""
+    """Return a line without comments, blanks and its number; empty where it says nothing, ``%`` where it is the tape's end.
+
+    What stands behind a ``%`` is a program's name or a remark.
+    """
     if len(line) > _LONGEST_LINE:
         raise InputError("line", f"{len(line)} characters", f"at most {_LONGEST_LINE}")
     text = "".join(_COMMENT.sub(" ", line).partition(";")[0].upper().split())
     if text.startswith("%"):
-        return "%"
+        return "%" if text == "%" else ""
     slashed = text.startswith("/")
     text = _NUMBERED.sub("", text.lstrip("/"), count=1) if text[:1] in "/N" else text
     if _LABEL.fullmatch(text):
         return ""
-    if any(sign in text for sign in "#[]="):
+    if "=" in text:
+        text = _TURNS.sub(lambda turns: f"P{int(turns[1]) + 1}", _RADIUS.sub(r"R\1", text))
+    if _MACRO.search(text):
         raise InputError("block", text, "numbers: macros are not run")
-    known = _WORDS.match(text)
-    if known is None or known.end() != len(text):
-        rest = text[known.end() if known else 0 :]
+    words = _CORNER.sub(r"\1\2", text) if "," in text else text
+    known = _WORDS.match(words)
+    if known is None or known.end() != len(words):
+        rest = words[known.end() if known else 0 :]
         allowed = "words of a letter and a number with a decimal point, comments in ( ) or behind ;"
         raise InputError("block", rest, allowed)
     if slashed and re.search(r"[GXYZIJKRF]", text):
@@ -87,15 +107,46 @@ def words_of(block: str) -> tuple[dict[str, list[float]], dict[str, float], dict
     for code in codes["M"]:
         if code in _SUBPROGRAMS:
             raise InputError("block", f"M{code:g}", "a program without subprograms and jumps")
-    rest = _CODES.sub("", block)
+    corners = _CORNER.findall(block) if "," in block else []
+    if len(corners) > 1:
+        raise InputError("block", block, "one corner in a line, ,R or ,C")
+    rest = _CODES.sub("", _CORNER.sub("", block) if corners else block)
     found = parse_parameters(_BARE_POINT.sub("", rest))
     if len(found) != sum(map(str.isalpha, rest)):
         raise InputError("block", block, "each word once in a line")
     for letter, value in found.items():
-        if letter not in _LETTERS:
-            raise InputError("block", f"{letter}{value}", f"words {', '.join(_LETTERS)}, G and M: other axes are not followed")
+        if letter not in _LETTERS and not (letter in ROTARY and float(value) == 0.0) and not (letter == "E" and 187 in codes["G"]):
+            raise InputError("block", f"{letter}{value}", f"words {', '.join(_LETTERS)}, G and M: other axes are followed at 0 alone")
         if not abs(float(value)) <= _LARGEST_NUMBER:
             raise InputError(letter, value, f"at most {_LARGEST_NUMBER:g}")
-    if ("P" in found or "Q" in found) and not (codes["M"] or any(KINDS[code] == "told" or code == 4 for code in codes["G"])):
-        raise InputError("block", block, "P and Q beside G4, G64 or an M word: turns of helices and cycles are not run")
-    return codes, told, {letter: float(value) for letter, value in found.items()}
+    if 5 in codes["G"] and found.keys() & set("XYZIJK"):
+        raise InputError("block", block, "G5 with P alone: splines are not followed")
+    return (
+        codes,
+        told,
+        {letter: float(value) for letter, value in found.items()} | {f",{letter}": float(value) for letter, value in corners},
+    )
+
+
+def check_further(
+    codes: Mapping[str, list[float]], words: Mapping[str, float], single: float | None, motion: float | None, cycle: bool
+) -> None:
+    """Refuse words of `FURTHER` that nothing in their line reads.
+
+    Parameters
+    ----------
+    codes, words : mapping
+        Of the line, as `words_of` returns them.
+    single, motion : float or None
+        Code of the line that acts in it alone, and the motion that stands.
+    cycle : bool
+        Whether a canned cycle stands.
+    """
+    said = codes["M"] or single == 4 or any(KINDS[code] in ("told", "system") for code in codes["G"])
+    if not (said or cycle) and ("Q" in words or ("P" in words and motion not in (2, 3))):
+        found = f"{'Q' if 'Q' in words else 'P'} that nothing reads"
+        raise InputError("block", found, "P and Q beside G4, G64, cycles or an M word, P in arcs")
+    if "L" in words and not cycle:
+        raise InputError("block", "L", "it in cycles, where it repeats holes")
+    if not words.keys().isdisjoint(CORNERS) and (motion != 1 or cycle or words.keys().isdisjoint("XYZ")):
+        raise InputError("block", "a corner without a straight move", ",R and ,C in moves by G1")

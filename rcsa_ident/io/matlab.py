@@ -6,6 +6,7 @@ struct, ``c{3}`` in a cell. Version 7.3 is HDF5 and goes through the same checks
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 import zlib
@@ -14,16 +15,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.io.channels import LARGEST_FILE, RATE, TIME_COLUMNS, Channel, check_lengths, placed, the_only
+from rcsa_ident.io.channels import LARGEST_FILE, RATE, Channel, check_lengths, placed, snapped, the_only, time_scale
 from rcsa_ident.io.files import existing_file, mapped
 from rcsa_ident.io.matlab_elements import COMPLETE, HEADER, NUMBERS, Version5
-from rcsa_ident.io.time_base import Irregular
+from rcsa_ident.io.time_base import Irregular, seconds_per, time_unit
 from rcsa_ident.io.validated_table import listed
 
-#: Variables that hold the rate [Hz].
-RATES = (RATE, "Fs", "fs")
+#: Variables that hold the rate [Hz] or the interval [s], without signs and capitals.
+_RATES = ("samplingratehz", "fs", "fshz", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "samplingfreq")
+_STEPS = ("dt", "ts", "deltat", "sampleinterval", "samplinginterval", "sampleperiod", "samplingperiod", "timestep")
 #: Signals of a matrix that are listed.
 _MOST_LISTED = 16
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -45,8 +49,9 @@ class Tables(Protocol):
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None, time: str | None = None) -> tuple[float, list[Channel]]:
     """Return the sampling rate [Hz] and the named signals as they stand in the file, shape (n,) each.
 
-    The rate comes from a vector ``time`` in seconds (in a struct also ``t`` and what begins with ``time``), else from a number
-    ``sampling_rate_hz`` or ``Fs``, both where the channel stands or around it, else from the campaign.
+    The rate comes from a vector ``time`` in seconds, or ``time_ms`` and the like (also ``t`` and what begins with ``time``, where it rises
+    and is as long), else from a number ``sampling_rate_hz``, ``Fs``, ``SampleRate`` or an interval ``dt``, ``Ts``, both where the
+    channel stands or around it, else from the campaign.
 
     Parameters
     ----------
@@ -67,7 +72,7 @@ def told_channels(path: Path) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     with tables_of(path) as tables:
         for name in tables.names(""):
-            if name in (*TIME_COLUMNS, "t", *RATES):
+            if time_unit(name) is not None or _plain(name) in (*_RATES, *_STEPS):
                 continue
             try:
                 shape = tables.shape(name)
@@ -111,11 +116,13 @@ def _read(tables: Tables, names: Sequence[str], default: float | None, time: str
         values = _signal(tables, times, read, where)
         check_lengths([times, *names[:1]], [values.size, channels[0].size], where)
         try:
-            return placed(values.astype(float), channels, rate)
+            return placed(values.astype(float) * _seconds(times), channels, rate)
         except Irregular as error:
             raise InputError(f"{times}({error.row + 1})", error.found, error.allowed, where) from None
     if rate is None:
-        raise InputError(RATE, "nothing", f"a vector 'time' [s], a number {' or '.join(RATES)}, or the campaign's rate [Hz]", where)
+        raise InputError(
+            RATE, "nothing", f"a vector 'time' [s], a number {RATE}, Fs or SampleRate, or dt, or the campaign's rate [Hz]", where
+        )
     return positive(RATE, rate, "Hz"), channels
 
 
@@ -152,22 +159,52 @@ def _times(tables: Tables, name: str, samples: int, default: float | None, time:
         scope = scope.rpartition(".")[0]
         inside = scope + "." if scope else ""
         beside = [each for each in present if each.startswith(inside) and "." not in each[len(inside) :] and each != name]
-        times = [inside + each for each in TIME_COLUMNS if inside + each in beside]
-        if inside and not times:
-            like = [each for each in beside if each[len(inside) :] == "t" or each[len(inside) :].startswith("time")]
-            times = _fitting(tables, [each for each in like if max(tables.shape(each)) == samples], default, where)
-        rates = {
-            each: tables.table(each).ravel() for each in (inside + rate for rate in RATES) if each in beside and min(tables.shape(each))
-        }
-        for each, values in rates.items():
-            if values.size != 1:
-                raise InputError(f"variable {each}", f"{values.size} numbers", "one number [Hz]", where)
-        known = [positive(f"variable {each}", float(values[0]), "Hz") for each, values in rates.items()]
-        if len(set(known)) > 1:
-            raise InputError(RATE, f"different rates ({', '.join(rates)})", "one rate [Hz]", where)
+        times = [each for each in beside if time_scale(each[len(inside) :]) is not None and each[len(inside) :].lower().startswith("time")]
+        if len(times) != 1:
+            like = [each for each in beside if each[len(inside) :].startswith("time") or time_unit(each[len(inside) :]) is not None]
+            times = _fitting(tables, times or [each for each in like if _rises(tables, each, samples)], default, where)
+        known = _rates(tables, [each for each in beside if _plain(each[len(inside) :]) in (*_RATES, *_STEPS)], default, where)
         if times or known:
             return times[0] if times else None, known[0] if known else default
     return None, default
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _seconds(name: str) -> float:
+    """Seconds per unit of a vector of times, by its name."""
+    return seconds_per(time_unit(name.rpartition(".")[2]) or "") or 1.0
+
+
+def _rises(tables: Tables, name: str, samples: int) -> bool:
+    """Whether a variable may be the times of a channel: as long, and rising."""
+    try:
+        shape = tables.shape(name)
+    except InputError:  # a text, a struct, a cell
+        return False
+    return bool(max(shape) == samples == math.prod(shape) and np.all(np.diff(tables.table(name).ravel()) > 0.0))
+
+
+def _rates(tables: Tables, names: list[str], default: float | None, where: str) -> list[float]:
+    """Rates [Hz] that numbers tell, as rates or as intervals; they have to agree."""
+    told: dict[str, float] = {}
+    for name in names:
+        interval = _plain(name.rpartition(".")[2]) in _STEPS
+        try:
+            values = tables.table(name).ravel() if min(tables.shape(name)) else np.empty(0)
+        except InputError:  # a text or a struct of that name
+            continue
+        if values.size == 1:
+            value = positive(f"variable {name}", float(values[0]), "s" if interval else "Hz")
+            told[name] = snapped(1.0 / value, 1e-9, default) if interval else value
+        elif values.size and not interval:
+            raise InputError(f"variable {name}", f"{values.size} numbers", "one number [Hz]", where)
+    found = list(told.values())
+    if found and max(found) > min(found) * (1.0 + 1e-6):
+        raise InputError(RATE, f"different rates ({', '.join(told)})", "one rate [Hz]", where)
+    return found
 
 
 def _fitting(tables: Tables, times: list[str], default: float | None, where: str) -> list[str]:
@@ -177,7 +214,7 @@ def _fitting(tables: Tables, times: list[str], default: float | None, where: str
     told: list[str] = []
     for each in times:
         try:
-            rate, _ = placed(tables.table(each).ravel().astype(float), [], default)
+            rate, _ = placed(tables.table(each).ravel().astype(float) * _seconds(each), [], default)
         except Irregular:
             continue
         if default is None or abs(rate / default - 1.0) < 1e-3:

@@ -161,7 +161,19 @@ def unpacked(raw: Bytes, variable: Variable, where: str) -> bytes:
     """Return the element of a variable, no longer than it declares and no more than a file of its size holds."""
     check_declared(-(-variable.length // 8), 1, len(raw), where)
     whole = raw[variable.start : variable.start + variable.size]
-    return zlib.decompressobj().decompress(whole, variable.length) if variable.packed else whole
+    return _inflated(whole, variable, where) if variable.packed else whole
+
+
+def _inflated(packed: bytes, variable: Variable, where: str) -> bytes:
+    """A packed element as long as its header declares, whose checksum holds: one flipped bit may otherwise make any number."""
+    unpacker = zlib.decompressobj()
+    whole = unpacker.decompress(packed, variable.length)
+    # the checksum stands behind the last byte, and is looked at only where one more is asked for
+    further = unpacker.decompress(unpacker.unconsumed_tail, 1)
+    if len(whole) != variable.length or further or not unpacker.eof or unpacker.unused_data:
+        found = "more" if further or unpacker.unused_data else f"{len(whole)} bytes, cut off,"
+        raise InputError(f"channel {variable.name}", f"{found} than the {variable.length} bytes that it declares", COMPLETE, where)
+    return whole
 
 
 def samples(raw: Bytes, order: str, variable: Variable, where: str) -> FloatArray:
@@ -171,7 +183,7 @@ def samples(raw: Bytes, order: str, variable: Variable, where: str) -> FloatArra
         raise InputError(field, f"{variable.length} bytes for {count} samples", COMPLETE, where)
     whole = raw[variable.start : variable.start + variable.size]
     if variable.packed:
-        whole = zlib.decompressobj().decompress(whole, variable.length)
+        whole = _inflated(whole, variable, where)
     kind, place, size, _ = _tag(whole, order, variable.data)
     if kind not in _TYPES:
         raise InputError(field, f"samples of type {kind}", "real numbers", where)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import re
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,8 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes, replacing
+from rcsa_ident.remarks import Remark, counted
+from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.toolpath.dexel import check_closed
 
 #: Suffixes of files that are read and written.
@@ -19,10 +23,31 @@ MESHES = (".stl", ".obj", ".ply")
 LARGEST = 512 * MEGABYTE
 #: Between which lengths the longest side of a workpiece lies [mm]: what is outside is given in another unit.
 _SHORTEST, _LONGEST = 1.0, 10_000.0
+_OTHERS = {"metres": 1e3, "micrometres": 1e-3}
+#: Of a binary STL: before its facets, and each of them.
+_BEFORE, _FACET = 84, 50
 
 
-def read_mesh(path: str | Path) -> tuple[FloatArray, np.ndarray]:
+class Surface(tuple[FloatArray, np.ndarray]):
+    """Points, shape (v, 3) [m], and triangles, shape (f, 3), of a closed surface, with what was remarked as it was read."""
+
+    remarks: tuple[Remark, ...]
+
+    def __new__(cls, points: FloatArray, faces: np.ndarray, remarks: tuple[Remark, ...] = ()) -> Surface:
+        """Return the pair with its remarks."""
+        surface = super().__new__(cls, (points, faces))
+        surface.remarks = remarks
+        return surface
+
+    def __reduce__(self) -> tuple[type[Surface], tuple[FloatArray, np.ndarray, tuple[Remark, ...]]]:
+        """Pickle and copy with the remarks."""
+        return type(self), (self[0], self[1], self.remarks)
+
+
+def read_mesh(path: str | Path) -> Surface:
     """Return the points, shape (v, 3) [m], and triangles, shape (f, 3), of a closed surface whose file is in millimetres.
+
+    Facets whose corners are not three points have no area: they are left out, which is remarked.
 
     Raises
     ------
@@ -35,9 +60,13 @@ def read_mesh(path: str | Path) -> tuple[FloatArray, np.ndarray]:
     return mesh_of(bytes(read_bytes(path, "mesh", LARGEST)), kind, where)
 
 
-def mesh_of(content: bytes, kind: str, where: str) -> tuple[FloatArray, np.ndarray]:
+def mesh_of(content: bytes, kind: str, where: str) -> Surface:
     """Return the surface of a file's content, as `read_mesh` does; `kind` is one of `MESHES`, `where` is named in the messages."""
     trimesh = _trimesh(where)
+    try:
+        _CHECKS[kind](content)
+    except InputError as error:
+        raise error.at(where) from None
     try:
         # points that stand at one place become one, so that neighbours share their edges
         found = trimesh.load(io.BytesIO(content), file_type=kind[1:], force="mesh", process=True, skip_materials=True)
@@ -47,15 +76,60 @@ def mesh_of(content: bytes, kind: str, where: str) -> tuple[FloatArray, np.ndarr
         raise InputError("mesh", f"what cannot be read as {kind[1:].upper()} ({type(error).__name__})", "a complete file", where) from None
     if points.ndim != 2 or not len(points) or not len(faces):
         raise InputError("mesh", "no triangle", "a closed surface of triangles", where)
+    flat = np.any(faces == np.roll(faces, 1, axis=1), axis=1)
+    faces = faces[~flat]
     try:
-        check_closed(points, faces)
+        check_closed(1e-3 * points, faces)
     except InputError as error:
         raise error.at(where) from None
     size = np.ptp(points, axis=0)
     if not _SHORTEST <= size.max() <= _LONGEST:
         sides = " x ".join(f"{side:.4g}" for side in size)
-        raise InputError("mesh", f"a body of {sides} mm", f"a longest side of {_SHORTEST:g} to {_LONGEST:g} mm; is the file in mm?", where)
-    return 1e-3 * points, faces
+        fitting = next((name for name, scale in _OTHERS.items() if _SHORTEST <= scale * size.max() <= _LONGEST), "another unit")
+        allowed = f"a longest side of {_SHORTEST:g} to {_LONGEST:g} mm; is the file in mm? It looks like one in {fitting}"
+        raise InputError("mesh", f"a body of {sides} mm", allowed, where)
+    words = f"{counted(int(flat.sum()), 'facet')} without area {'is' if flat.sum() == 1 else 'are'} left out of the mesh"
+    return Surface(1e-3 * points, faces, (Remark(RecordCode.ASSUMED, words),) if flat.any() else ())
+
+
+def _check_stl(content: bytes) -> None:
+    """Refuse an STL file whose facets are not as many as it says, or that goes on behind them."""
+    count = struct.unpack_from("<I", content, _BEFORE - 4)[0] if len(content) >= _BEFORE else 0
+    words = content.lower() if content.lstrip()[:5].lower() == b"solid" and len(content) != _BEFORE + _FACET * count else b""
+    if b"facet" in words:
+        # names of solids stand in the first and the last line
+        end = words.rfind(b"endsolid")
+        body, last = (words[words.find(b"\n") : end], words[end:].partition(b"\n")[2]) if end >= 0 else (words, b"no end")
+        corners, ended = body.count(b"vertex"), body.count(b"endfacet")
+        begun = body.count(b"facet") - ended
+        if begun != ended or corners != 3 * begun or last.strip():
+            found = f"{begun} facets, {ended} of them ended, with {corners} corners, and {'no endsolid' if end < 0 else 'more'} behind them"
+            raise InputError(
+                "mesh", found if last.strip() else found.partition(", and")[0], "three corners a facet, and endsolid as the last line"
+            )
+    elif len(content) != _BEFORE + _FACET * count:
+        found = f"{len(content)} bytes for {count} facets"
+        raise InputError("mesh", found, f"a complete STL file: {_BEFORE + _FACET * count} bytes for as many")
+
+
+def _check_ply(content: bytes) -> None:
+    """Refuse a PLY file in text whose lines are not as many as it says; of a binary one the library compares them."""
+    head, _, body = content.partition(b"end_header")
+    if b"format ascii" in head:
+        told = sum(int(count) for count in re.findall(rb"^element\s+\w+\s+(\d{1,12})\s*$", head, re.MULTILINE))
+        found = sum(1 for line in body.splitlines() if line.strip())
+        if found != told:
+            raise InputError("mesh", f"{found} lines for {told} points and faces", "a line for each that the head of the file declares")
+
+
+def _check_obj(content: bytes) -> None:
+    """Refuse an OBJ file with a face of fewer than three corners, as of a line that was cut short."""
+    short = re.search(rb"^[ \t]*f(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", content, re.MULTILINE)
+    if short:
+        raise InputError("mesh", short[0].decode("ascii", "replace").strip(), "three corners or more in a face, f a b c")
+
+
+_CHECKS = {".stl": _check_stl, ".ply": _check_ply, ".obj": _check_obj}
 
 
 def write_mesh(path: str | Path, points: FloatArray, faces: np.ndarray) -> None:

@@ -9,13 +9,14 @@ from pathlib import Path
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import RATE, notes_of
 from rcsa_ident.io.recordings import READERS, SOUND, read_signals
-from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, name_and_unit, of_unit, told_table
+from rcsa_ident.io.text_header import name_and_unit
+from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, known_unit, of_unit, told_table
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.verdict import RecordCode
 
 #: Tables of text.
-TEXT = (".csv", ".txt", ".dat", ".tsv", ".asc")
+TEXT = (".csv", ".txt", ".dat", ".tsv", ".asc", ".lvm")
 #: Formats whose readers list a file's channels.
 _LISTING = {
     ".h5": "hdf5",
@@ -56,7 +57,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
     if suffix not in _LISTING:
         raise InputError("recording", f"suffix '{suffix}'", f"one of {', '.join(dict.fromkeys([*TEXT, *READERS]))}", str(path))
     told: dict[str, str] = dict(import_module(f"rcsa_ident.io.{_LISTING[suffix]}").told_channels(path))
-    units = {name: name_and_unit(name)[1] or unit for name, unit in told.items()}
+    units = {name: name_and_unit(name, known_unit)[1] or unit for name, unit in told.items()}
     # beside channels of known units there may be others of another length or rate
     wanted = list(names) or [name for name, unit in units.items() if of_unit(unit)[1] is not None] or list(units)
     if not wanted:

@@ -18,7 +18,6 @@ from rcsa_ident.io.channels import (
     LARGEST_DATA,
     LARGEST_FILE,
     RATE,
-    TIME_COLUMNS,
     Channel,
     Scratch,
     cannot_be_read,
@@ -27,6 +26,7 @@ from rcsa_ident.io.channels import (
     lacks,
     placed,
     the_only,
+    time_scale,
 )
 from rcsa_ident.io.files import MEGABYTE, Bytes, mapped
 from rcsa_ident.io.time_base import Irregular
@@ -99,7 +99,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
             raise InputError(RATE, "nothing", f"a column 'time' [s], the file's metadata {RATE}, or the campaign's rate [Hz]", where)
         return positive(RATE, rate, "Hz"), columns
     try:
-        return placed(columns[-1][:], columns[:-1], rate)
+        return placed(columns[-1][:] * (time_scale(wanted[-1]) or 1.0), columns[:-1], rate)
     except Irregular as error:
         raise InputError(f"column {wanted[-1]} row {error.row + 1}", error.found, error.allowed, where) from None
 
@@ -112,7 +112,7 @@ def told_channels(path: Path) -> list[tuple[str, str]]:
         names = [each[4, _BYTES].decode("utf-8", "replace") for each in columns if (4, _BYTES) in each and _kind(each) in _NUMBERS]
     except IndexError:
         raise InputError("recording", "a description that cannot be read", COMPLETE, where) from None
-    return [(name, "") for name in names if name.lower() not in TIME_COLUMNS]
+    return [(name, "") for name in names if time_scale(name) is None]
 
 
 def _described(raw: Bytes, where: str) -> Struct:
@@ -143,7 +143,7 @@ def _checked(described: Struct, names: Sequence[str], default: float | None, raw
     present = [column[4, _BYTES].decode("utf-8", "replace") for column in columns if (4, _BYTES) in column]
     if len(present) < len(columns):
         raise IndexError
-    time = [name for name in present if name.lower() in TIME_COLUMNS and name not in names]
+    time = [name for name in present if time_scale(name) is not None and name not in names]
     if len(time) > 1:
         raise InputError("time", f"columns {' and '.join(time)}", "one time column", where)
     wanted = [*names, *time]

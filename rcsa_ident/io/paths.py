@@ -19,7 +19,9 @@ from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("i", "j", "k")
 FEED, SPEED = "feed_mm_per_min", "spindle_speed_rpm"
-PROGRAMS = (".nc", ".gcode", ".ngc", ".tap")
+PROGRAMS = (".nc", ".gcode", ".ngc", ".tap", ".mpf", ".eia", ".cnc", ".txt")
+#: Programs in plain text of Heidenhain, which are told as what they are.
+_PLAIN = ".h"
 _ALLOWED = f"a program, {', '.join(PROGRAMS)}, or a table, .csv"
 #: Farther than any arm reaches [m]: the lengths are in another unit.
 _FARTHEST = 20.0
@@ -47,7 +49,7 @@ def read_tool_path(path: str | Path) -> ToolPath:
     (3, 80.0)
     """
     kind = Path(path).suffix.lower()
-    if kind in PROGRAMS:
+    if kind in (*PROGRAMS, _PLAIN):
         found = read_gcode(path)
         _check_reach(found, lambda row: f"{path} line {found.line[row]}")
         return found

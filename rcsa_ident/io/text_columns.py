@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.io.channels import TIME_COLUMNS, Channel, Scratch, placed
+from rcsa_ident.io.channels import Channel, Scratch, placed
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
+from rcsa_ident.io.text_header import DELIMITERS
 from rcsa_ident.io.time_base import Irregular
 from rcsa_ident.io.validated_table import listed
 
@@ -19,7 +21,6 @@ LARGEST_TEXT = 256 * MEGABYTE
 #: Bytes of a part, in which recordings are read.
 _PART = 4 * MEGABYTE
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
-DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,57 +203,63 @@ def _blocks(path: Path, field: str, largest: int) -> Iterator[bytes]:
         raise InputError(field, error.strerror or "an error on reading", "a file that can be read", str(path)) from None
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
-    """Return the sampling rate [Hz] and the named channels of a recording, shape (n,) each; long ones on the disk.
+class Meant(NamedTuple):
+    """Which columns of a header are meant.
 
-    The rate comes from a column ``time`` in seconds, else from the campaign. Samples that the time column skips are NaN.
+    Parameters
+    ----------
+    time : tuple of str
+        The column of times, if there is one.
+    seconds : float
+        Its unit in seconds.
+    channels : tuple of str
+        Names in the header.
+    """
+
+    time: tuple[str, ...]
+    seconds: float
+    channels: tuple[str, ...]
+
+
+def read_channels(path: Path, meant: Callable[[tuple[str, ...]], Meant], default_rate: float | None) -> tuple[float, list[Channel]]:
+    """Return the sampling rate [Hz] and channels of a recording whose first line is its header, shape (n,) each; long ones on the disk.
+
+    The rate comes from the column of times, else from the campaign. Samples that the times skip are NaN.
 
     Parameters
     ----------
     path : path
-    names : sequence of str
-        Channels that are wanted.
+    meant : callable
+        Says of the header which columns are read.
     default_rate : float or None [Hz]
         For a file that carries no rate.
     """
     where = str(path)
     parts = _Parts("recording", where)
-    time: list[str] = []
+    read: Meant | None = None
     scratch: list[Scratch] = []
     numbers: list[np.ndarray] = []
     for block in _blocks(path, "recording", LARGEST_TEXT):
-        found = parts.plain(block, [*time, *names])
+        found = parts.plain(block, [*read.time, *read.channels]) if read else None
         if found is None:
             table = parts.next(decoded(block, "recording", where))
-            if not scratch:
-                time = _time_column(table, names)
-                scratch = [Scratch() for _ in (*time, *names)]
-            found = np.array(table.numbers, dtype=np.int32), table.columns([*time, *names])
+            if read is None:
+                read = meant(table.header)
+                scratch = [Scratch() for _ in (*read.time, *read.channels)]
+            found = np.array(table.numbers, dtype=np.int32), table.columns([*read.time, *read.channels])
         numbers.append(found[0])
         for column, values in zip(scratch, found[1], strict=True):
             column.add(values)
     columns = [column.channel() for column in scratch]
-    if not time:
+    if read is None or not read.time:
         if default_rate is None:
             raise InputError("sampling_rate_hz", "nothing", "a column 'time' [s], or the campaign's rate [Hz]", where)
         return positive("sampling_rate_hz", default_rate, "Hz"), columns
     try:
-        return placed(columns[0][:], columns[1:], default_rate)
+        return placed(columns[0][:] * read.seconds, columns[1:], default_rate)
     except Irregular as error:
         line = np.concatenate(numbers)[error.row]
-        raise InputError("column time", error.found, error.allowed, f"{where} line {line}") from None
-
-
-def _time_column(table: TextTable, names: Sequence[str]) -> list[str]:
-    """The column of times, if there is one, of a table that has all the named ones."""
-    for name in names:
-        if table.header.count(name) != 1:
-            found = "no such channel" if name not in table.header else "two columns of that name"
-            raise InputError(f"channel {name}", found, f"one column of the file: {listed(table.header)}", table.where)
-    time = [name for name in table.header if name.lower() in TIME_COLUMNS and name not in names]
-    if len(time) > 1:
-        raise InputError("time", f"columns {' and '.join(time)}", "one time column", table.where)
-    return time
+        raise InputError(f"column {read.time[0]}", error.found, error.allowed, f"{where} line {line}") from None
 
 
 def decoded(raw: bytes, field: str, where: str) -> str:

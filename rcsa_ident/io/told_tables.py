@@ -12,30 +12,25 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import text_columns
-from rcsa_ident.io.channels import VOLTAGES, Channel, Signals, the_only
+from rcsa_ident.io.channels import VOLTAGES, Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.frf_files import FORCES, MOTIONS
-from rcsa_ident.io.text_columns import DELIMITERS, LARGEST_TEXT, decoded
-from rcsa_ident.io.time_base import Irregular, uniform
+from rcsa_ident.io.text_columns import LARGEST_TEXT, Meant, decoded
+from rcsa_ident.io.text_header import Head, columns_of, read_head, split, tells_rate, times_of
+from rcsa_ident.io.text_rows import STAMP, beside, first_numbers, lines_of, numbers_of, rows_of
+from rcsa_ident.io.time_base import UNITS_OF_TIME, Irregular, seconds_per, time_unit, uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
-#: A time column, and its unit in seconds.
-_TIME = re.compile(r"^\s*(?:time|t|timestamp|zeit|abscissa)\b", re.IGNORECASE)
-_TIME_IN_SECONDS = ("time_s", "t_s")
-_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
-#: ``name (unit)`` and ``name [unit]``.
-_NAME_AND_UNIT = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
 _DERIVATIVES = {0: Quantity.DISPLACEMENT, 2: Quantity.ACCELERATION}
-#: A sampling rate in the lines above a table.
-_RATE_WORDS = re.compile(r"(?:sampl\w*[ _]?(?:rate|freq\w*)|abtastrate)\D*(?P<value>\d+(?:[.,]\d+)?)", re.IGNORECASE)
+#: Units of times without a unit, which the rate decides; and as a share, rates that agree.
+_UNITLESS = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
+_ALIKE = 0.01
 #: A line that begins a further measuring cycle, below the numbers of the one before.
 _CYCLE = re.compile(r"\s*cycle (no|number)\b", re.IGNORECASE)
 _FIRST_CYCLE = "only the first of {} measuring cycles was read"
-#: Lines of remarks in front of the names, at most.
-_MOST_HEADER = 200
 #: Bytes of a file in which its first numbers stand.
 _HEAD = MEGABYTE // 8
 
@@ -122,25 +117,79 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     default_rate : float or None [Hz]
         For a file that carries no rate.
     """
-    if not _has_preamble(path):
-        return text_columns.read_channels(path, names, default_rate)
-    opened = told_table(path, default_rate, names)
-    present = [each.name for each in opened.channels]
-    channels = [opened.channels[the_only(name, present, "")] for name in names]
-    return opened.rate, Signals([each.samples for each in channels], opened.remarks, tuple((each.unit, each.quantity) for each in channels))
+    if _tells_more(path):
+        opened = told_table(path, default_rate, names)
+        present = [each.name for each in opened.channels]
+        channels = [opened.channels[the_only(name, present, "")] for name in names]
+        told = tuple((each.unit, each.quantity) for each in channels)
+        return opened.rate, Signals([each.samples for each in channels], opened.remarks, told)
+    units: list[str] = []
+    notes: list[Remark] = []
+
+    def meant(header: tuple[str, ...]) -> Meant:
+        own, every = columns_of(header, [""] * len(header), known_unit)
+        places = [_place(name, own, header, str(path)) for name in names]
+        units[:] = [every[i] for i in places]
+        times = [i for i in times_of(own, every) if i not in places]
+        if len(times) > 1:
+            raise InputError("time", f"columns {' and '.join(header[i] for i in times)}", "one time column", str(path))
+        seconds = [_seconds(own[i], every[i], notes, str(path)) for i in times]
+        return Meant(tuple(header[i] for i in times), seconds[0] if seconds else 1.0, tuple(header[i] for i in places))
+
+    rate, signals = text_columns.read_channels(path, meant, default_rate)
+    scales = [of_unit(unit) for unit in units]
+    scaled = [_scaled(signal, factor) for signal, (factor, _) in zip(signals, scales, strict=True)]
+    return rate, Signals(scaled, tuple(notes), tuple((unit, quantity) for unit, (_, quantity) in zip(units, scales, strict=True)))
 
 
-def _has_preamble(path: Path) -> bool:
-    """Whether more than one line, comments aside, stands above the first numbers."""
+def _scaled(signal: Channel, factor: float) -> Channel:
+    if factor == 1.0:
+        return signal
+    if isinstance(signal, StoredChannel):
+        return StoredChannel(signal.size, lambda first, end: factor * signal.read(first, end))
+    return factor * signal
+
+
+def _place(name: str, names: Sequence[str], texts: Sequence[str], where: str) -> int:
+    """Place of a channel that is called by its name or by the whole cell, its unit with it."""
+    places = [i for i, told in enumerate(zip(names, texts, strict=True)) if name in told]
+    if len(places) != 1:
+        found = "two columns of that name" if places else "no such channel"
+        raise InputError(f"channel {name}", found, f"one column of the file: {listed(list(texts))}", where)
+    return places[0]
+
+
+def _seconds(name: str, unit: str, notes: list[Remark], where: str) -> float:
+    """Seconds per unit of a column of times; one that nothing tells is said, but of a column 'time' in a campaign's table."""
+    told = time_unit(name, unit)
+    seconds = seconds_per(told or unit)
+    if seconds is None:
+        raise InputError(f"unit of column {name}", told or unit, UNITS_OF_TIME, where)
+    if not told and not unit and name.lower() != "time":
+        notes.append(assumed(name, "", "time [s]"))
+    return seconds
+
+
+def _tells_more(path: Path) -> bool:
+    """Whether more than a line of names stands above the first numbers, comments aside, or the numbers are no plain table."""
     existing_file(path, "recording", LARGEST_TEXT)
     with path.open("rb") as file:
         raw = file.read(_HEAD)
     try:
-        lines = decoded(raw, "recording", str(path)).replace('"', "").splitlines()[:-1]
-        start = _first_numbers([line.rstrip(" \t;,") for line in lines], str(path))[0]
+        text = decoded(raw, "recording", str(path))
+        lines = lines_of(text)[:-1]
+        start, delimiter, _ = first_numbers(lines, str(path))
     except InputError:
         return False
-    return sum(bool(line.strip()) and not line.lstrip().startswith("#") for line in lines[:start]) > 1
+    above = [line for line in lines[:start] if line]
+    head = [line for line in above if not line.startswith("#")]
+    if len(head) > 1 or not delimiter or any(tells_rate(line) for line in above if line.startswith("#")):
+        return True
+    # what a spreadsheet would not take for a table: names in quotes around the delimiter, lines of several lengths
+    unlike = len({line.count(delimiter) for line in text.splitlines()[start - 1 : start + 1]}) > 1
+    cells = split(head[-1], delimiter) if head else []
+    names, units = columns_of(cells, [""] * len(cells), known_unit)
+    return unlike or len(times_of(names, units)) > 1 or any(STAMP.fullmatch(cell) for cell in split(lines[start], delimiter))
 
 
 def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = ()) -> OpenRecording:
@@ -160,51 +209,104 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
         As `open_recording`.
     """
     where = str(path)
-    lines = decoded(read_bytes(path, "recording", LARGEST_TEXT), "recording", where).replace('"', "").splitlines()
-    lines = [line.rstrip(" \t;,") for line in lines]
-    start, delimiter, comma = _first_numbers(lines, where)
-    width = len(_cells(lines[start], delimiter))
-    names, units, rate = _header(lines[:start], delimiter, width, wanted)
+    lines = beside(lines_of(decoded(read_bytes(path, "recording", LARGEST_TEXT), "recording", where)))
+    start, delimiter, comma = first_numbers(lines, where)
     cycles = [i for i in range(start, len(lines)) if _CYCLE.match(lines[i])]
-    values = _numbers(lines[: cycles[0] if cycles else None], start, delimiter, comma, width, where)
+    rows, width = rows_of(lines[: cycles[0] if cycles else None], start, delimiter)
+    comma = comma or (delimiter != "," and any("," in row for row in rows))
+    head = read_head(lines[:start], delimiter, comma, width, wanted, known_unit, default_rate, where)
+    values, stamped = numbers_of(rows, delimiter, comma, width, where)
     remarks = [Remark(RecordCode.ASSUMED, _FIRST_CYCLE.format(len(cycles) + 1))] if cycles else []
-    time = [i for i, name in enumerate(names) if _TIME.match(name)]
-    if time and not units[time[0]] and names[time[0]].lower() not in _TIME_IN_SECONDS:
-        remarks.append(assumed(names[time[0]], "", "time [s]"))
-    if not time and default_rate is None and rate is None and np.all(np.diff(values[:, 0]) > 0.0):
+    if not head.named:
+        remarks.append(Remark(RecordCode.ASSUMED, f"no line above the numbers names their {width} columns: they are counted"))
+    counts = {i for i in head.counts if _steps_of_one(values[:, i])}
+    time = stamped[:1] or [i for i in head.times if i not in counts and not np.all(np.isnan(values[:, i]))]
+    told = head.rates[0] if head.rates else default_rate
+    if time and not stamped and told and not _unit_of(head, time[0]) and _steps_of_one(values[:, time[0]]) and told != 1.0:
+        counts, time = counts | set(time), []
+    if not time and told is None and 0 not in counts and np.all(np.diff(values[:, 0]) > 0.0) and not _steps_of_one(values[:, 0]):
         time = [0]
-        remarks.append(Remark(RecordCode.ASSUMED, f"{names[0]}, which rises throughout, was taken as the time [s]"))
+        remarks.append(Remark(RecordCode.ASSUMED, f"{head.names[0]}, which rises throughout, was taken as the time [s]"))
     if time:
-        seconds = _seconds(units[time[0]])
-        if seconds is None:
-            raise InputError(f"unit of column {names[time[0]]}", units[time[0]], "s, ms or us", where)
-        try:
-            rate, place = uniform(values[:, time[0]] * seconds, default_rate)
-        except Irregular as error:
-            even = _nearly_even(values[:, time[0]] * seconds)
-            if even is None:
-                raise InputError(f"column {names[time[0]]}", error.found, error.allowed, f"{where} row {error.row + 1}") from None
-            rate, place = even, np.arange(values.shape[0])
-            words = f"times that stand less than half a sample from their places were taken as even, {rate:.6g} Hz"
+        rate, values = _timed(head, values, time[0], bool(stamped), told, remarks, where)
+        _check_one_time(head, values, time[0], where)
+    elif told is not None:
+        rate = told
+        if len(head.rates) > 1:
+            words = f"the lines above the numbers tell {listed([f'{each:.6g} Hz' for each in head.rates])}: the first one counts"
             remarks.append(Remark(RecordCode.ASSUMED, words))
-        if place[-1] + 1 != place.size:
-            full = np.full((place[-1] + 1, width), np.nan)
-            full[place] = values
-            values = full
-    elif default_rate is not None or rate is not None:
-        rate = default_rate or rate
     else:
-        raise InputError("sampling_rate_hz", "nothing", "a column 'time' with its unit, or the rate [Hz], told", where)
-    assert rate is not None
+        found = f"nothing, and column {head.names[min(counts)]} counts samples" if counts else "nothing"
+        raise InputError("sampling_rate_hz", found, "a column 'time' with its unit, or the rate [Hz], told", where)
+    called = {_place(name, head.names, head.texts, where): name for name in wanted}
     channels = []
-    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
-        if i in time or not (name in wanted or np.ptp(np.nan_to_num(values[:, i])) > 0.0):
+    for i, (name, unit) in enumerate(zip(head.names, head.units, strict=True)):
+        if i in counts and i not in called:
+            remarks.append(Remark(RecordCode.ASSUMED, f"column {name} counts samples and was left out"))
+        elif i in (*time, *stamped, *head.times) and i not in called:
             continue
-        factor, quantity = of_unit(unit)
-        channels.append(OpenChannel(name, unit, quantity, np.ascontiguousarray(values[:, i] * factor)))
+        elif i in called or np.ptp(np.nan_to_num(values[:, i])) > 0.0:
+            factor, quantity = of_unit(unit)
+            channels.append(OpenChannel(called.get(i, name), unit, quantity, np.ascontiguousarray(values[:, i] * factor)))
     if not channels:
-        raise InputError("recording", f"columns {listed(names)}", "a column of numbers that move beside the time", where)
+        raise InputError("recording", f"columns {listed(head.names)}", "a column of numbers that move beside the time", where)
     return OpenRecording(float(rate), tuple(channels), tuple(remarks))
+
+
+def _unit_of(head: Head, place: int) -> str:
+    return time_unit(head.names[place], head.units[place]) or head.units[place]
+
+
+def _steps_of_one(values: FloatArray) -> bool:
+    """Whether a column counts samples."""
+    return values.size > 2 and bool(np.all(np.diff(values) == 1.0) and values[0] == np.rint(values[0]))
+
+
+def _timed(
+    head: Head, values: FloatArray, place: int, stamped: bool, told: float | None, remarks: list[Remark], where: str
+) -> tuple[float, FloatArray]:
+    """The rate [Hz] that a column of times tells, and the rows at their places; samples that the times skip are NaN."""
+    name, time = head.names[place], values[:, place]
+    seconds = 1.0
+    if not stamped:
+        notes: list[Remark] = []
+        seconds = _seconds(name, head.units[place], notes, where)
+        untold = not _unit_of(head, place)
+        fitting = [
+            s for s in _UNITLESS if untold and head.rates and abs(float(np.median(np.diff(time))) * s * head.rates[0] - 1.0) < _ALIKE
+        ]
+        if fitting and fitting[0] != 1.0:
+            seconds = fitting[0]
+            words = f"{name} has no unit: {_UNITLESS[seconds]} are assumed, which the rate that the file tells asks for"
+            remarks.append(Remark(RecordCode.ASSUMED, words))
+        elif untold and not fitting and not any(name in note for note in remarks):
+            remarks.append(assumed(name, "", "time [s]"))
+    try:
+        rate, index = uniform(time * seconds, told)
+    except Irregular as error:
+        even = _nearly_even(time * seconds)
+        if even is None:
+            raise InputError(f"column {name}", error.found, error.allowed, f"{where} row {error.row + 1}") from None
+        rate, index = even, np.arange(values.shape[0])
+        words = f"times that stand less than half a sample from their places were taken as even, {rate:.6g} Hz"
+        remarks.append(Remark(RecordCode.ASSUMED, words))
+    if head.rates and abs(rate / head.rates[0] - 1.0) > _ALIKE:
+        words = f"the times give {rate:.6g} Hz, the lines above them tell {head.rates[0]:.6g} Hz: the times count"
+        remarks.append(Remark(RecordCode.ASSUMED, words))
+    if index[-1] + 1 == index.size:
+        return rate, values
+    full = np.full((index[-1] + 1, values.shape[1]), np.nan)
+    full[index] = values
+    return rate, full
+
+
+def _check_one_time(head: Head, values: FloatArray, place: int, where: str) -> None:
+    """Refuse columns that stand side by side, each with its own times, where the times are not the same."""
+    alike = [i for i in head.times if i != place and (head.names[i], head.units[i]) == (head.names[place], head.units[place])]
+    for other in alike:
+        if np.nanmax(np.abs(values[:, other] - values[:, place])) > 1e-3 * np.nanmedian(np.diff(values[:, place])):
+            found = f"columns {place + 1} and {other + 1} of different times"
+            raise InputError("time", found, "channels that were sampled together: one file each, or one time for all", where)
 
 
 def _nearly_even(time: FloatArray) -> float | None:
@@ -216,66 +318,9 @@ def _nearly_even(time: FloatArray) -> float | None:
     return float(1.0 / step) if np.abs(time - start - step * place).max() < 0.5 * step else None
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in (line.split(delimiter) if delimiter else line.split())]
-
-
-def _first_numbers(lines: Sequence[str], where: str) -> tuple[int, str, bool]:
-    """Index of the first line of numbers, the delimiter ('' for blanks), and whether the decimal sign is a comma."""
-    for i, line in enumerate(lines[:_MOST_HEADER]):
-        for delimiter in (*DELIMITERS, ""):
-            cells = _cells(line, delimiter)
-            if len(cells) < 2:
-                continue
-            following = _cells(next((later for later in lines[i + 1 : _MOST_HEADER + 2] if later.strip()), ""), delimiter)
-            for comma in (False, True) if delimiter != "," else (False,):
-                if len(following) == len(cells) and all(_is_number(cell, comma) for cell in (*cells, *following)):
-                    return i, delimiter, comma
-    raise InputError("recording", "no two lines of numbers that follow each other", "a table of numbers with names above it", where)
-
-
-def _is_number(cell: str, comma: bool) -> bool:
-    text = cell.replace(",", ".") if comma else cell
-    if "_" in text:
-        return False
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _header(above: Sequence[str], delimiter: str, width: int, wanted: Sequence[str]) -> tuple[list[str], list[str], float | None]:
-    """Names and units of the columns, and a rate, from the lines above them: the last ones of the table's width are names, then units."""
-    tables = [cells for line in above if len(cells := _cells(line.lstrip("# "), delimiter)) == width and any(cells)]
-    names = tables[-1] if tables else [f"column {i + 1}" for i in range(width)]
-    units = [""] * width
-    known = len(tables) > 1 and all(cell == "" or _known_unit(cell) for cell in tables[-1])
-    if known or (len(tables) > 1 and wanted and set(wanted) <= set(tables[-2]) - set(tables[-1])):
-        names, units = tables[-2], tables[-1]
-    found = [name_and_unit(name) for name in names]
-    units = [unit or own for (_, own), unit in zip(found, units, strict=True)]
-    names = [name for name, _ in found]
-    rate = None
-    for line in above:
-        match = _RATE_WORDS.search(line)
-        if match:
-            rate = float(match["value"].replace(",", ".")) * (1e3 if "khz" in line.lower() else 1.0)
-    return names, units, rate
-
-
-def _known_unit(text: str) -> bool:
-    return (_seconds(text) is not None and text != "") or of_unit(text)[1] is not None or text in ("-", "%", "rpm", *VOLTAGES)
-
-
-def _seconds(unit: str) -> float | None:
-    return _SECONDS.get(unit.strip().lower())
-
-
-def name_and_unit(text: str) -> tuple[str, str]:
-    """Return both of ``name (unit)`` or ``name [unit]``; the unit is empty where none is told."""
-    found = _NAME_AND_UNIT.match(text)
-    return (found["name"].strip(), found["unit"].strip()) if found else (text, "")
+def known_unit(text: str) -> bool:
+    """Return whether a text is a unit of something that is measured, or of a voltage."""
+    return of_unit(text)[1] is not None or text in VOLTAGES
 
 
 def of_unit(unit: str) -> tuple[float, Quantity | None]:
@@ -288,26 +333,3 @@ def of_unit(unit: str) -> tuple[float, Quantity | None]:
     if unit.strip() in VOLTAGES:
         return VOLTAGES[unit.strip()], None
     return 1.0, None
-
-
-def _numbers(lines: Sequence[str], start: int, delimiter: str, comma: bool, width: int, where: str) -> FloatArray:
-    """All lines of numbers, shape (n, width); a header that comes again is left out, an empty cell is NaN."""
-    rows = [line for line in lines[start:] if line and not line.isspace()]
-    # two equal rows are two rows, also where something stands between the first one and the others
-    repeated = {line for line in lines[:start] if not all(_is_number(cell, comma) for cell in _cells(line, delimiter))}
-    rows = [row for row in rows if row not in repeated]
-    if comma:
-        rows = [row.replace(",", ".") for row in rows]
-    try:
-        values = np.loadtxt(rows, delimiter=delimiter or None, comments=None, ndmin=2)
-        if values.shape[1] == width:
-            return values
-    except ValueError:
-        pass
-    full = np.full((len(rows), width), np.nan)
-    for i, row in enumerate(rows):
-        cells = _cells(row, delimiter)
-        if len(cells) > width or any(cell and not _is_number(cell, False) for cell in cells):
-            raise InputError("recording", row, f"{width} numbers", f"{where}, row {i + 1} of numbers")
-        full[i, : len(cells)] = [float(cell) if cell else np.nan for cell in cells]
-    return full

@@ -1,4 +1,4 @@
-"""Tool libraries of Fusion 360 and HSM: plain JSON, or that JSON in a zip container (.tools), become toolings.
+"""Tool libraries of Fusion 360 and HSM become toolings: plain JSON, that JSON in a zip container (.tools), or XML (.hsmlib).
 
 An entry may also hold the properties of ISO 13399 by their names, as makers print them: DC, RE, KAPR, APMX, ZEFP and so on.
 
@@ -22,6 +22,8 @@ from rcsa_ident.cutting.outlines import key_of, missing
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.hsm_libraries import hsm_entries
+from rcsa_ident.io.library_entries import plain_entry, preset_notes
 from rcsa_ident.io.library_shapes import NotRead, check_type, iso_geometry, iso_shape_keys, shape_keys
 from rcsa_ident.io.setups import tooling_of
 from rcsa_ident.io.toml_text import keys_of_toml
@@ -37,6 +39,10 @@ MOST_ENTRIES = 20_000
 MOST_SEGMENTS = 200
 _MOST_FILES = 100
 UNITS = {"millimeters": 1.0, "inches": 25.4}
+_CUTTER_ALONE = (
+    "[cutter] alone, since the library tells no holder: lobes and advice take it with modes or FRFs of its tip; for a model of the tool "
+    "add [tool], [holder] and [contact], or name one of the library's holders"
+)
 #: Of a holder's length and a gauge line: they come from drawings with rounded figures.
 _ROUNDING = 0.05
 _HOLDER = "holder"
@@ -158,7 +164,7 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None,
         if len(named) != 1:
             known = listed([_name(e) for e in holders]) or "it has none"
             raise InputError("holder", f"{given.holder}, {len(named)} times", f"one of the library's holders: {known}", where)
-        spare = named[0]
+        spare = plain_entry(named[0])[0]
     found = []
     for number, entry in enumerate(entries, start=1):
         place = f"data[{number - 1}]" if len(entries) > 1 or "data" in content else ""
@@ -167,9 +173,11 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None,
             continue
         name, kind = _name(entry), _line(entry.get("type", ""))
         try:
-            data, notes = _tooling(Table(entry, where, place), name, given, spare)
+            read, found_in = plain_entry(entry)
+            data, notes = _tooling(Table(read, where, place), name, given, spare)
+            notes += [*found_in, *preset_notes(read)]
             text = tooling_text(data, notes)
-            tooling = tooling_of(keys_of_toml(text, "tooling", where), where, name)
+            tooling = tooling_of(keys_of_toml(text, "tooling", where), where, name, tip_known="tool" not in data)
             _check_drawn(tooling)
             found.append(Imported(number, name, kind, tooling, text, tuple(notes), ""))
         except NotRead as skipped:
@@ -207,6 +215,8 @@ def _content(raw: bytes, where: str) -> Any:
     """The JSON of a library, out of its container where it is in one."""
     if raw[:4] == b"PK\x03\x04":
         raw = _unpacked(raw, where)
+    if raw[:200].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
+        return hsm_entries(raw, where)
 
     def refuse(text: str) -> NoReturn:
         raise InputError("tool library", text, "finite numbers", where)
@@ -271,6 +281,9 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
         inserts = shape.get("shape") in (CutterShape.FACE, CutterShape.HIGH_FEED)
         helix = 0.0 if inserts else given.helix_deg
         notes.append(f"helix angle {helix:g}° assumed{', as of inserts' if inserts else ''}: none in the library")
+    cutter = {"teeth": teeth, "diameter_mm": diameter, "helix_deg": helix} | shape
+    if spare is None and not _has_segments(entry.data.get("holder")):
+        return {"name": name, "cutter": cutter}, [*notes, _CUTTER_ALONE]
     material = _body(entry, given, notes)
     segments, shank = _tool_segments(entry, geometry, diameter, scale, given, material, notes)
     stickout, insertion = _lengths(geometry, scale, given, notes)
@@ -280,7 +293,7 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
         holder = _bored(holder, insertion, shank)
     data: dict[str, Any] = {
         "name": name,
-        "cutter": {"teeth": teeth, "diameter_mm": diameter, "helix_deg": helix} | shape,
+        "cutter": cutter,
         "tool": {"stickout_mm": stickout, "segments": segments},
         "holder": {"insertion_mm": insertion, "segments": holder},
     }
@@ -403,13 +416,12 @@ def _holder_segments(
 ) -> list[dict[str, Any]]:
     """The holder's cones up to its gauge line, of steel, bored for the tool where the insertion is given."""
     own = entry.data.get("holder")
-    if isinstance(own, Mapping) and own.get("segments"):
+    if _has_segments(own):
         table = Table(own, entry.where, entry.name("holder"))
-    elif spare is not None:
+    else:
+        assert spare is not None
         table = Table(spare, entry.where, "holder")
         notes.append(f"holder {_name(spare)} of the library")
-    else:
-        raise NotRead("a tool without a holder; name one of the library's")
     if "unit" in table:
         scale = UNITS[table.text("unit", choices=tuple(UNITS))]
     cones = _stack(table, scale)
@@ -425,6 +437,10 @@ def _holder_segments(
     notes.append("holder of solid steel behind the tool: no bore in the library")
     cones = [c | {"material": _STEEL} for c in cones]
     return cones if insertion is None else _bored(cones, insertion, shank)
+
+
+def _has_segments(holder: Any) -> bool:
+    return isinstance(holder, Mapping) and bool(holder.get("segments"))
 
 
 def _behind(left: float, holder: list[dict[str, Any]], notes: list[str]) -> float:

@@ -76,8 +76,8 @@ def _parsed(raw: bytes) -> ElementTree.Element:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError("URDF", f"a character that is not UTF-8 in line {raw.count(10, 0, error.start) + 1}", "text in UTF-8") from None
-    if "<!doctype" in text.lower() or "<!entity" in text.lower():
-        # with them a small file may become a large one, or another
+    # with them a small file may become a large one, or another; with zeros between its signs, as in UTF-16, one would not be found
+    if "\0" in text or "<!doctype" in text.lower() or "<!entity" in text.lower():
         raise InputError("URDF", "a document type declaration", "XML without one")
     try:
         root = ElementTree.fromstring(text)

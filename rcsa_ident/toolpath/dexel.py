@@ -8,6 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 from rcsa_ident.toolpath._surface_kernels import crossings, nodes_and_rest, occupied, segments_between, surface_net
 
@@ -59,6 +60,8 @@ class DexelField(Shown):
         by (x, y).
     counts : tuple of three arrays of int, shape (m, n)
         Segments of each line.
+    remarks : tuple of Remark
+        What was remarked as the file was read from which it came.
 
     Examples
     --------
@@ -74,6 +77,7 @@ class DexelField(Shown):
     shape: tuple[int, int, int]
     segs: tuple[FloatArray, FloatArray, FloatArray]
     counts: tuple[FloatArray, FloatArray, FloatArray]
+    remarks: tuple[Remark, ...] = ()
 
     @classmethod
     def block(cls, low: FloatArray, high: FloatArray, cell: float) -> DexelField:

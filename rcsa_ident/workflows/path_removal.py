@@ -117,7 +117,11 @@ def field_of(tooling: Tooling, block: Block | None = None, surface: Surface | No
     if memory_of(high - low, cell) > _MOST_MEMORY:
         found = f"{1e3 * cell:g} mm, for which the stock takes {memory_of(high - low, cell) / 1e9:.3g} GB"
         raise InputError("cell", found, f"cells for which it takes at most {_MOST_MEMORY / 1e9:g} GB")
-    return DexelField.block(low, high, cell) if surface is None else DexelField.from_mesh(*surface, cell)
+    if surface is None:
+        return DexelField.block(low, high, cell)
+    field = DexelField.from_mesh(*surface, cell)
+    field.remarks = getattr(surface, "remarks", ())
+    return field
 
 
 def remove_along(
@@ -166,7 +170,9 @@ def remove_along(
     removed = before - field.volume
     seconds = time.perf_counter() - start
     warnings += [*_rapid(fine, engagement), *guard.warnings, *_odd_outcome(removed, before, warnings)]
-    return PathRemoval(fine, engagement, engagement.volumes(solid), field, removed, sweep.updates, seconds, (*path.remarks, *warnings))
+    return PathRemoval(
+        fine, engagement, engagement.volumes(solid), field, removed, sweep.updates, seconds, (*path.remarks, *field.remarks, *warnings)
+    )
 
 
 def _misplaced(solid: ToolSolid, path: ToolPath, low: FloatArray, high: FloatArray) -> list[str]:

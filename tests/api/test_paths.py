@@ -244,7 +244,7 @@ def test_what_cannot_be_cut_is_refused_by_its_field(shop, program, kind, changed
 def test_files_that_are_none_are_refused(shop, program, tmp_path):
     client, id = shop
     for name, text, told in (
-        ("PART.txt", PROGRAM, "PART.txt"),
+        ("PART.dxf", PROGRAM, "PART.dxf"),
         ("PART.nc", "G21\nG02 X1", "line 2"),
         ("PART.nc", "G21 G90\nG0 X1", ""),
         ("PART.csv", "x_mm,y_mm\n1,2\n", "z_mm"),

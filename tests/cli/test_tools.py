@@ -161,3 +161,12 @@ def test_the_tutorial_shows_what_holders_prints_and_keeps_how_uncertain_it_is(tm
     (tmp_path / "TOOL.toml").write_text(blocks[asked + 2], encoding="utf-8")
     tooling = read_tooling(tmp_path / "TOOL.toml")
     assert (tooling.spread, tooling.remarks) == (catalogue.holder("HSK-A63", "ER32", 0.010).spread, ())
+
+
+def test_a_cutter_alone_is_written_and_listed(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    (tmp_path / "L.json").write_text(json.dumps(library(end_mill(holder=None))), encoding="utf-8")
+    said = run("import-tools", tmp_path / "L.json", "--out", tmp_path / "T").stdout
+    assert "cutter alone" in said
+    read = read_tooling(tmp_path / "T" / "VHM-12-R0-long.toml", tip_known=True)
+    assert (read.cutter.teeth, read.cutter.diameter) == (4, 0.012)

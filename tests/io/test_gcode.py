@@ -78,6 +78,11 @@ def test_inches():
         ("M98.5\nG1 X1", [[1.0, 0.0, 0.0]]),
         ("G1 X1\nM30\nX2", [[1.0, 0.0, 0.0]]),
         ("G1 X1\n%\nX2", [[1.0, 0.0, 0.0]]),
+        ("G1 X1\n% the second pass\nX2\n%", [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
+        ("G0 G17 G40 G49 G80 G90 X3", [[3.0, 0.0, 0.0]]),
+        ("G91 G28 A0. C0\nG90 G0 X1 A0. B-0.0", [[1.0, 0.0, 0.0]]),
+        ("G187 P1 E0.01\nG05 P10000\nG08 P1\nG05.1 Q1\nG54.1 P3\nG1 X1\nG54.1 P3\nG05.1 Q0 X0 Y0 Z0", [[1.0, 0.0, 0.0]]),
+        ("G154 P2\nG1 X1", [[1.0, 0.0, 0.0]]),
         # a retracted tool stands at the highest that is told, before it goes aside
         ("G1 X1 Z-2\nG91 G28 Z0\nG90 G0 X5\nZ9", [[1.0, 0.0, -2.0], [1.0, 0.0, 9.0], [5.0, 0.0, 9.0], [5.0, 0.0, 9.0]]),
         ("G0 Z9\nG1 Z-2\nG0 G53 Z0\nG0 X5\nZ-2", [[0, 0, 9], [0, 0, -2], [0, 0, 9], [5, 0, 9], [5, 0, -2]]),
@@ -242,6 +247,16 @@ def test_arcs_have_the_length_and_area_of_their_circle(radius, begin, turn, cloc
     assert len(at) - 2 <= turn / (2.0 * math.acos(max(1.0 - tolerance / radius, 0.0))) + 1.0
 
 
+def test_arcs_turn_several_times():
+    """P as LinuxCNC has it, the last turn counted; TURN of Sinumerik counts further ones, and CR is the radius."""
+    helix = gcode_of(f"{AT_ZERO}G3 X-10 Y10 Z-6 I-10 P3 F60", "P.nc")
+    assert helix.length == pytest.approx(1e-3 * math.hypot(10.0 * (0.5 * math.pi + 4.0 * math.pi), 6.0), rel=1e-4)
+    assert (1e3 * helix.places[-1]).round(9).tolist() == [-10.0, 10.0, -6.0]
+    np.testing.assert_array_equal(gcode_of(f"{AT_ZERO}G3 X-10 Y10 Z-6 I-10 TURN=2 F60", "P.nc").places, helix.places)
+    by_radius, sinumerik = (gcode_of(f"{AT_ZERO}G3 X-10 Y10 {word} F60", "P.nc").places for word in ("R10", "CR=10"))
+    np.testing.assert_array_equal(by_radius, sinumerik)
+
+
 def test_a_full_circle_needs_its_centre():
     path = gcode_of(f"{AT_ZERO}G2 I10 F60", "P.nc")
     assert path.length == pytest.approx(0.02 * math.pi, rel=1e-4)
@@ -260,10 +275,26 @@ def refused(text: str, field: str, words: str, line: int = 2) -> None:
     ("text", "field", "words"),
     [
         ("G41 D1 X1", "block", "radius correction"),
-        ("G81 X1 R2", "block", "canned cycles"),
+        ("G87 X1 R2 Z-1 Q1", "block", "steps aside"),
+        ("G81 X1 R2", "cycle", "without Z or R"),
+        ("G81 X1 Z5 R2", "cycle", "goes down"),
+        ("G83 X1 Z-5 R2", "Q", "the step of a hole"),
+        ("G83 X1 Z-5 R2 Q1e-5".replace("1e-5", ".00001"), "Q", "at most 10000"),
+        ("G81 X1 Z-5 R2 K1.5", "K or L", "whole number"),
+        ("G81 X1 Z-5 R2 I1", "cycle", "I or J"),
+        ("G18 G81 X1 Z-5 R2", "cycle", "another plane"),
+        ("G0 G81 X1 Z-5 R2", "block", "G0 and G81"),
+        ("G1 X5 L2", "block", "repeats holes"),
+        ("G1 X5 Q2", "block", "Q that nothing reads"),
+        ("G0 X5 ,R1", "block", "moves by G1"),
+        ("G1 X5 ,R1 ,C1", "block", "one corner"),
+        ("G1 X5 ,R0", ",R", "greater than 0"),
+        ("G5 X1 Y1 I1 J1 P1 Q1", "block", "splines"),
+        ("G2 X10 I5 P1.5", "P", "how many turns"),
+        ("G2 X10 RND=5", "block", "macros"),
+        ("G1 X1 A5.", "block", "at 0 alone"),
         ("G95", "block", "per minute"),
         ("G93", "block", "per minute"),
-        ("G5 X1", "block", "one of G0"),
         ("G92 X0", "block", "one of G0"),
         ("G0 G1 X1", "block", "G0 and G1"),
         ("G90 G91 X1", "block", "G90 and G91"),
@@ -284,13 +315,13 @@ def refused(text: str, field: str, words: str, line: int = 2) -> None:
         ("T1.5", "T", "tool"),
         ("G1 X1 I2", "block", "arcs"),
         ("G80 X1", "block", "G0 to G3"),
+        ("G16 X1", "block", "one of G0"),
         ("G2 X1", "arc", "neither"),
         ("G2 X1 I1 R1", "arc", "both"),
         ("G2 X1 K1 I1", "K", "I and J"),
         ("G2 X10 R4", "R", "half the way"),
         ("G2 X10 Y0 I4 J0", "centre of the arc", "6 mm"),
         ("G2 X10 I0 J0", "centre of the arc", "begins"),
-        ("G2 X10 Y0 I5 P3", "block", "turns"),
         ("G2 I99999999", "I", "at most"),
         ("/G1 X5", "block", "switch"),
         ("G53 G1 X5", "block", "G53 G0"),

@@ -12,6 +12,7 @@ import pytest
 import scipy.io
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.open_recording import open_recording
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.hostile_matlab import HOSTILE, matrix
@@ -64,6 +65,37 @@ def test_where_the_rate_comes_from(tmp_path, newer):
     found = read_recording(path, (X,), 1000.0)
     assert found.rate == 200.0
     np.testing.assert_array_equal(found.samples[:, 0], [1.5, -2.0, np.nan, 3.0, 4.0])
+
+
+TOLD = {
+    "t": {"t": np.arange(4.0) / 25_600.0},
+    "time in milliseconds": {"time_ms": 1e3 * np.arange(4.0) / 25_600.0},
+    "dt": {"dt": 1.0 / 25_600.0},
+    "an interval": {"SampleInterval": 1.0 / 25_600.0},
+    "SampleRate": {"SampleRate": 25_600.0},
+    "two that agree": {"sample_rate": 25_600.0, "Ts": 1.0 / 25_600.0},
+    "no time, since it falls": {"t": np.array([3.0, 2.0, 1.0, 0.0]), "Fs": 25_600.0},
+    "no rate, since it is a text": {"SampleRate": "high", "Fs": 25_600.0},
+    "no interval, since it has many": {"dt": np.full(4, 0.1), "Fs": 25_600.0},
+}
+
+
+@both
+@pytest.mark.parametrize("name", TOLD)
+def test_names_that_programs_give_times_and_rates(tmp_path, newer, name):
+    path = tmp_path / "cut.mat"
+    save(path, newer, x=VALUES, **TOLD[name])
+    found = read_recording(path, (X,), 51_200.0)
+    assert found.rate == pytest.approx(25_600.0, rel=1e-12)
+    np.testing.assert_array_equal(found.samples[:, 0], VALUES)
+    assert [each.name for each in open_recording(path).channels] == ["x"]
+
+
+@both
+def test_a_rate_and_an_interval_that_disagree_are_refused(tmp_path, newer):
+    save(tmp_path / "cut.mat", newer, x=VALUES, Fs=1000.0, dt=0.002)
+    with pytest.raises(InputError, match="different rates"):
+        read_recording(tmp_path / "cut.mat", (X,))
 
 
 def save_nested(path: Path, newer: bool, **variables: object) -> None:
@@ -340,3 +372,42 @@ def test_version_73_is_guarded_as_hdf5(tmp_path, spoil, words):
     with pytest.raises(InputError) as caught:
         read_recording(path, (X,))
     assert words in str(caught.value)
+
+
+def packed(values: np.ndarray) -> bytes:
+    """A file of version 5 with one packed variable, as MATLAB's -v7."""
+    from io import BytesIO
+
+    raw = BytesIO()
+    scipy.io.savemat(raw, {"x": values, "Fs": 1000.0}, do_compression=True)
+    return raw.getvalue()
+
+
+def test_a_flipped_bit_is_never_read_as_numbers(tmp_path):
+    """The checksum of a packed variable is compared: before, 16 of 400 such files were read, with values up to 5e298."""
+    rng, path = np.random.default_rng(43), tmp_path / "cut.mat"
+    values = np.rint(1e3 * rng.normal(size=2000)) / 1e3
+    whole, sensor = packed(values), (Sensor("x", Quantity.TRIGGER),)
+    refused = 0
+    for place in rng.integers(128, len(whole), 400):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        try:
+            found = read_recording(path, sensor)
+        except InputError:
+            refused += 1
+        else:  # a bit that fills up a byte, or one of another variable
+            assert np.array_equal(found.samples[:, 0], values)
+    assert refused > 380
+
+
+@pytest.mark.parametrize("behind", [b"\0" * 8, b"\1"])
+def test_what_stands_behind_a_packed_variable_is_refused(tmp_path, behind):
+    whole = packed(np.arange(100.0))
+    size = struct.unpack_from("<I", whole, 132)[0]
+    place = 136 + size
+    longer = whole[:132] + struct.pack("<I", size + len(behind)) + whole[136:place] + behind + whole[place:]
+    (tmp_path / "cut.mat").write_bytes(longer)
+    with pytest.raises(InputError, match=r"more than the .* bytes that it declares"):
+        read_recording(tmp_path / "cut.mat", (Sensor("x", Quantity.TRIGGER),))

@@ -40,6 +40,15 @@ def test_byte_stream_split_and_small_types(tmp_path):
     np.testing.assert_array_equal(read_recording(path, (X, Y), 100.0).samples, np.stack([single, whole], axis=1))
 
 
+@pytest.mark.parametrize(("name", "scale"), [("time_s", 1.0), ("time_ms", 1e3), ("Time_us", 1e6), ("t_ns", 1e9)])
+def test_the_name_of_the_times_tells_their_unit(tmp_path, name, scale):
+    """Before, a column time_ms was no time, and the campaign's rate counted."""
+    path = write(tmp_path / "cut.parquet", None, {"x": VALUES, name: scale * np.arange(5000) / 25_600.0})
+    found = read_recording(path, (X,), 51_200.0)
+    assert found.rate == pytest.approx(25_600.0, rel=1e-9)
+    np.testing.assert_array_equal(found.samples[:, 0], VALUES)
+
+
 def test_where_the_rate_comes_from(tmp_path):
     path = tmp_path / "cut.parquet"
     assert read_recording(write(path, None, {"x": VALUES}), (X,), 1000.0).rate == 1000.0

@@ -58,7 +58,7 @@ def test_the_name_says_the_form(tmp_path):
         np.testing.assert_allclose(found.axes, path.axes, atol=1e-12)
         np.testing.assert_allclose(found.feed, path.feed)
         np.testing.assert_allclose(found.speed, path.speed)
-    for action in (lambda: read_tool_path(tmp_path / "P.txt"), lambda: write_tool_path(tmp_path / "P.txt", upright)):
+    for action in (lambda: read_tool_path(tmp_path / "P.dxf"), lambda: write_tool_path(tmp_path / "P.dxf", upright)):
         with pytest.raises(InputError, match=r"\.nc"):
             action()
     (tmp_path / "far.nc").write_text("G0 X0 Y0 Z0\nX90000\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import struct
 import tomllib
 import tracemalloc
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.tool_libraries import Assumptions, file_names, import_tools, read_tool_library
+from rcsa_ident.machining_setup import BareCutter
 from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
 from tests.fixtures.tool_library import END_MILL, end_mill, inches, library
@@ -158,8 +160,6 @@ SKIPPED = [
     (end_mill(type="thread mill"), "a thread mill, not a milling tool"),
     (end_mill(type="milling body"), "a milling body, a shape that is not known here"),
     (end_mill(type=None), "an entry without a type"),
-    (end_mill(holder=None), "a tool without a holder; name one of the library's"),
-    (end_mill(holder={}), "a tool without a holder"),
     (end_mill(geometry__OAL=60.0), "a tool that ends at the holder's nose (OAL and LB); the insertion has to be given"),
     (end_mill(geometry__OAL=None), "data[0].geometry.OAL: found nothing"),
     (end_mill(geometry__NOF=0), "data[0].geometry.NOF: found 0, allowed is a whole number at least 1"),
@@ -187,6 +187,101 @@ def test_an_entry_that_cannot_be_a_tooling_says_why_and_the_others_go_on(entry, 
     assert found[0].tooling is None
     assert found[0].text == ""
     assert found[1].tooling is not None
+
+
+@pytest.mark.parametrize(
+    "entry", [end_mill(holder=None), end_mill(holder={}), end_mill(holder=None, geometry__OAL=None, geometry__LB=None)]
+)
+def test_a_cutter_without_a_holder_comes_in_alone(tmp_path, entry):
+    """Before, nothing came in of libraries that makers offer, where holders stand elsewhere or nowhere."""
+    found = only(entry)
+    assert isinstance(found.tooling, BareCutter)
+    assert any(note.startswith("[cutter] alone, since the library tells no holder") for note in found.notes)
+    (tmp_path / "T.toml").write_text(found.text, encoding="utf-8")
+    read = read_tooling(tmp_path / "T.toml", tip_known=True)
+    assert isinstance(read, BareCutter)
+    assert (read.name, read.cutter.teeth, read.cutter.diameter) == ("VHM 12 R0 long", 4, 0.012)
+    assert "\n[tool]" not in found.text
+
+
+@pytest.mark.parametrize(
+    ("unit", "told", "diameter"),
+    [
+        ("millimeters", "12", 12.0),
+        ("millimeters", "12,7", 12.7),
+        ("millimeters", "1/2 in", 12.7),
+        ("millimeters", '0.5"', 12.7),
+        ("millimeters", "12 mm", 12.0),
+        ("inches", "0.5", 12.7),
+        ("inches", ".5 in", 12.7),
+        ("inches", "12 mm", 12.0),
+        ("inches", "1.2 cm", 12.0),
+    ],
+)
+def test_numbers_may_be_texts_and_have_units(unit, told, diameter):
+    entry = {"type": "flat end mill", "unit": unit, "geometry": {"DC": told, "NOF": "4", "FHA": "38 deg"}}
+    cutter = only(entry).tooling.cutter
+    assert 1e3 * cutter.diameter == pytest.approx(diameter, rel=1e-12)
+    assert (cutter.teeth, math.degrees(cutter.helix)) == (4, pytest.approx(38.0))
+    by_expression = entry | {"geometry": {"NOF": 4, "DC": 3.0}, "expressions": {"tool_diameter": told, "tool_numberOfFlutes": "4"}}
+    found = only(by_expression)
+    assert 1e3 * found.tooling.cutter.diameter == pytest.approx(diameter, rel=1e-12)
+    assert any(f"in place of 3 taken from the expression tool_diameter = {told.strip()}" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("told", ["12 furlongs", "twelve", "tool_diameter / 2", "1/0", ""])
+def test_a_text_that_is_no_number_is_refused_by_its_words(told):
+    found = imported({"type": "flat end mill", "unit": "millimeters", "geometry": {"DC": told, "NOF": 4}})[0]
+    assert found.tooling is None
+    assert "geometry.DC: found" in found.reason
+
+
+HSM = """<?xml version="1.0" encoding="UTF-8"?>
+<tool-library version="1.7" xmlns="http://example.org/toollibrary">
+ <tool guid="{1}" type="bull nose end mill" unit="inches" version="1.4">
+  <description>half inch, R 0.03</description>
+  <material name="carbide"/>
+  <body diameter="0.5" number-of-flutes="3" corner-radius="0.03" flute-length="1" overall-length="3" shaft-diameter="0.5"/>
+  <holder><section diameter="1" length="2"/></holder>
+  <motion spindle-rpm="9000" cutting-feedrate="60"/>
+ </tool>
+ <tool type="drill" unit="millimeters"><description>drill</description><body diameter="5"/></tool>
+</tool-library>
+"""
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_xml_of_hsmworks(encoding):
+    cutter, drill = import_tools(HSM.encode(encoding), "L.hsmlib")
+    assert drill.reason == "a drill, not a milling tool"
+    assert (cutter.name, cutter.tooling.cutter.teeth) == ("half inch, R 0.03", 3)
+    assert 1e3 * cutter.tooling.cutter.diameter == pytest.approx(12.7, rel=1e-12)
+    assert 1e3 * cutter.tooling.cutter.corner_radius == pytest.approx(0.762, rel=1e-12)
+    assert "preset of the library, where an advice may start: 9000 rev/min, 1524 mm/min" in cutter.notes
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda text: text[:300], "XML that cannot be read"),
+        (lambda text: text.replace("<tool-library", '<!DOCTYPE a [<!ENTITY b "c">]><tool-library'), "a document type"),
+        (lambda text: "<html></html>", "no list of tools"),
+    ],
+)
+def test_xml_that_is_no_library_is_refused(spoil, words):
+    with pytest.raises(InputError, match=words):
+        import_tools(spoil(HSM).encode(), "L.hsmlib")
+    with pytest.raises(InputError):
+        import_tools(spoil(HSM).encode("utf-16-le"), "L.hsmlib")
+
+
+def test_presets_are_where_an_advice_may_start():
+    presets = [{"name": "Aluminium", "n": 12000, "f_z": 0.05, "v_f": "2400 mm", "stepdown": 2.0}, {"name": "empty"}, "no preset"]
+    metric = only(end_mill() | {"start-values": {"presets": presets}})
+    words = "preset Aluminium, where an advice may start: 12000 rev/min, 0.05 mm per tooth, 2400 mm/min, depth 2 mm"
+    assert [note for note in metric.notes if "preset" in note] == [words]
+    imperial = only(inches(END_MILL) | {"start-values": {"presets": [{"name": "a", "f_z": 0.002}]}})
+    assert "preset a, where an advice may start: 0.0508 mm per tooth" in imperial.notes
 
 
 def test_a_holder_of_the_library_serves_tools_without_one():

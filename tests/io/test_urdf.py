@@ -138,6 +138,14 @@ def test_of_branches_one_is_chosen(tmp_path):
         read(tmp_path, two_links(), flange="tip")
 
 
+def test_a_declaration_in_utf_16_is_found(tmp_path):
+    """Read as UTF-8 it has a zero behind every sign, which the reader of XML passes over."""
+    path = tmp_path / "arm.urdf"
+    path.write_bytes('<!DOCTYPE r [<!ENTITY a "b">]><robot name="&a;"/>'.encode("utf-16-le"))
+    with pytest.raises(InputError, match="a document type declaration"):
+        read_urdf(path, [1e6])
+
+
 def test_one_stiffness_for_all_or_one_a_joint(tmp_path):
     arm, _ = read(tmp_path, two_links(), [2e6, 1e6], [5.0])
     assert [j.stiffness for j in arm.joints] == [2e6, 1e6]
