@@ -53,8 +53,6 @@ class StoredChannel:
         return self.read(0, self.size)
 
 
-#: Units of a signal before its sensitivity, in volts.
-VOLTAGES = {"V": 1.0, "mV": 1e-3}
 #: A channel's samples: an array, or what reads parts of one.
 Channel = FloatArray | StoredChannel
 

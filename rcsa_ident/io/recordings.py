@@ -11,10 +11,11 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import LARGEST_DATA, VOLTAGES, Channel, Signals, StoredChannel, notes_of
+from rcsa_ident.io.channels import LARGEST_DATA, Channel, Signals, StoredChannel, notes_of
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.signals.told_units import is_untold, volts_in
 
 Reader = Callable[..., tuple[float, Sequence[Channel]]]
 
@@ -195,7 +196,7 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
 
 
 def _check_units(units: Sequence[tuple[str, Quantity | None]], sensors: Sequence[Sensor]) -> None:
-    """Refuse sensors that contradict the units which their file says itself."""
+    """Refuse sensors that contradict the units which their file says itself, and units that no sensitivity turns into SI."""
     for sensor, (unit, quantity) in zip(sensors, units, strict=True):
         if sensor.quantity is Quantity.TRIGGER:
             continue
@@ -204,8 +205,9 @@ def _check_units(units: Sequence[tuple[str, Quantity | None]], sensors: Sequence
         if quantity is not None and sensor.sensitivity != 1.0:
             allowed = f"1.0: the file says {unit}, and its samples are turned into SI"
             raise InputError(f"sensors.{sensor.name}.sensitivity", sensor.sensitivity, allowed)
-        if unit in VOLTAGES and sensor.sensitivity == 1.0:
-            allowed = f"the sensor's sensitivity [V per SI unit]: the file is in {unit}"
+        if quantity is None and not is_untold(unit) and sensor.sensitivity == 1.0:
+            signal = unit if volts_in(unit) is None else "V"
+            allowed = f"the sensor's sensitivity [{signal} per SI unit]: the file is in {unit}"
             raise InputError(f"sensors.{sensor.name}.sensitivity", sensor.sensitivity, allowed)
 
 

@@ -12,23 +12,21 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import text_columns
-from rcsa_ident.io.channels import VOLTAGES, Channel, Signals, the_only
+from rcsa_ident.io.channels import Channel, Signals, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
-from rcsa_ident.io.frf_files import FORCES, MOTIONS
 from rcsa_ident.io.text_columns import DELIMITERS, LARGEST_TEXT, decoded
 from rcsa_ident.io.time_base import Irregular, uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
+from rcsa_ident.signals.told_units import is_untold, quantity_in, seconds_in, told_unit
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
 #: A time column, and its unit in seconds.
 _TIME = re.compile(r"^\s*(?:time|t|timestamp|zeit|abscissa)\b", re.IGNORECASE)
 _TIME_IN_SECONDS = ("time_s", "t_s")
-_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
 #: ``name (unit)`` and ``name [unit]``.
 _NAME_AND_UNIT = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
-_DERIVATIVES = {0: Quantity.DISPLACEMENT, 2: Quantity.ACCELERATION}
 #: A sampling rate in the lines above a table.
 _RATE_WORDS = re.compile(r"(?:sampl\w*[ _]?(?:rate|freq\w*)|abtastrate)\D*(?P<value>\d+(?:[.,]\d+)?)", re.IGNORECASE)
 #: A line that begins a further measuring cycle, below the numbers of the one before.
@@ -104,7 +102,12 @@ class OpenRecording:
         if not kept:
             found = listed([f"{each.name} [{each.unit}]" for each in chosen])
             raise InputError("quantity", found, f"a channel that measures {quantity}")
-        units = tuple(assumed(each.name, each.unit, f"{quantity} [{SI_UNITS[quantity]}]") for each in kept if each.quantity is None)
+        # lines stay where they are in any unit, amplitudes do not
+        units = tuple(
+            assumed(each.name, each.unit, f"{quantity} [{SI_UNITS[quantity]}]" if is_untold(each.unit) else f"{quantity}, in that unit,")
+            for each in kept
+            if each.quantity is None
+        )
         return quantity, kept, (*self.remarks, *units)
 
 
@@ -200,7 +203,7 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):
         if i in time or not (name in wanted or np.ptp(np.nan_to_num(values[:, i])) > 0.0):
             continue
-        factor, quantity = of_unit(unit)
+        factor, quantity = quantity_in(unit)
         channels.append(OpenChannel(name, unit, quantity, np.ascontiguousarray(values[:, i] * factor)))
     if not channels:
         raise InputError("recording", f"columns {listed(names)}", "a column of numbers that move beside the time", where)
@@ -250,7 +253,7 @@ def _header(above: Sequence[str], delimiter: str, width: int, wanted: Sequence[s
     tables = [cells for line in above if len(cells := _cells(line.lstrip("# "), delimiter)) == width and any(cells)]
     names = tables[-1] if tables else [f"column {i + 1}" for i in range(width)]
     units = [""] * width
-    known = len(tables) > 1 and all(cell == "" or _known_unit(cell) for cell in tables[-1])
+    known = len(tables) > 1 and all(_known_unit(cell) for cell in tables[-1])
     if known or (len(tables) > 1 and wanted and set(wanted) <= set(tables[-2]) - set(tables[-1])):
         names, units = tables[-2], tables[-1]
     found = [name_and_unit(name) for name in names]
@@ -265,29 +268,17 @@ def _header(above: Sequence[str], delimiter: str, width: int, wanted: Sequence[s
 
 
 def _known_unit(text: str) -> bool:
-    return (_seconds(text) is not None and text != "") or of_unit(text)[1] is not None or text in ("-", "%", "rpm", *VOLTAGES)
+    return told_unit(text) is not None or is_untold(text) or text == "%"
 
 
 def _seconds(unit: str) -> float | None:
-    return _SECONDS.get(unit.strip().lower())
+    return 1.0 if is_untold(unit) else seconds_in(unit)
 
 
 def name_and_unit(text: str) -> tuple[str, str]:
     """Return both of ``name (unit)`` or ``name [unit]``; the unit is empty where none is told."""
     found = _NAME_AND_UNIT.match(text)
     return (found["name"].strip(), found["unit"].strip()) if found else (text, "")
-
-
-def of_unit(unit: str) -> tuple[float, Quantity | None]:
-    """Return SI units per unit and what it measures; (1, None) where it says nothing that is known."""
-    plain = unit.strip().lower().replace(" ", "").replace("²", "2").replace("^", "").replace("**", "").replace("µ", "u").replace("μ", "u")
-    if plain in MOTIONS and MOTIONS[plain][1] in _DERIVATIVES:
-        return MOTIONS[plain][0], _DERIVATIVES[MOTIONS[plain][1]]
-    if plain in FORCES:
-        return FORCES[plain], Quantity.FORCE
-    if unit.strip() in VOLTAGES:
-        return VOLTAGES[unit.strip()], None
-    return 1.0, None
 
 
 def _numbers(lines: Sequence[str], start: int, delimiter: str, comma: bool, width: int, where: str) -> FloatArray:
