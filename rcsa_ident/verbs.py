@@ -216,6 +216,7 @@ def read_tap_tests(
     yx: str | Path | None = None,
     units: str | None = None,
     from_hz: float = 0.0,
+    correction: str = "auto",
 ) -> Receptance:
     """Return a tip's receptance from tap tests: FRF.csv, UFF 58, CutPro- or MetalMAX-style text columns.
 
@@ -229,6 +230,8 @@ def read_tap_tests(
         As ``um/N`` or ``(m/s^2)/N``, whatever the files say; by default as they say.
     from_hz : float [Hz]
         Lines below it are left out: there, an accelerometer's drift is larger than what moves.
+    correction : str
+        reverse, conjugate or exchange, for a reversed sensor or hammer, e^{-iωt}, exchanged columns; none; auto turns what is certain.
 
     Examples
     --------
@@ -239,10 +242,12 @@ def read_tap_tests(
     >>> print(ri.read_tap_tests(y=tip, from_hz=50.0))
     tip.x, tip.y: 12545 frequencies, 51 to 25600 Hz
     """
+    from rcsa_ident.dynamics.passivity import correction_of
     from rcsa_ident.io.frf_files import Source, read_tapped_tip
 
     given = {("X", "X"): x, ("Y", "Y"): y, ("X", "Y"): xy, ("Y", "X"): yx}
-    return read_tapped_tip([Source(Path(path), pair) for pair, path in given.items() if path is not None], units, from_hz)
+    turn = correction_of(correction)
+    return read_tapped_tip([Source(Path(path), pair, None, turn) for pair, path in given.items() if path is not None], units, from_hz)
 
 
 def advise(

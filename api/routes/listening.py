@@ -117,12 +117,14 @@ async def tap(
     rate_hz: Rate = None,
     force_sensitivity: Sensitivity = None,
     response_sensitivity: Sensitivity = None,
+    reverse: Annotated[bool, Query(description="The sensor or the hammer is reversed: turn the sign.")] = False,
 ) -> Any:
     accept = request.headers.get("accept", "")
     kind, suffix = next(((kind, suffix) for kind, suffix in ((CSV, ".csv"), (UFF, ".uff")) if kind in accept), (JSON, ""))
     asked = {
         "axis": axis, "force": force, "response": response, "quantity": quantity, "estimator": estimator, "sensor_mass_g": sensor_mass_g,
-        "rate_hz": rate_hz, "force_sensitivity": force_sensitivity, "response_sensitivity": response_sensitivity, "file": suffix,
+        "rate_hz": rate_hz, "force_sensitivity": force_sensitivity, "response_sensitivity": response_sensitivity,
+        "reverse": reverse, "file": suffix,
     }  # fmt: skip
     target: Path = await run_in_threadpool(components.files.spare, caller.group)
     try:

@@ -177,7 +177,7 @@ def believed_of(
         return Believed(*found.uncertain_tip(own)), tooling, None
     if alone:
         tooling = read_tooling(files[0], tip_known=True)
-        tapped = idle_tip(tip.frf or [], tip.frf_units, tip.frf_from_hz)
+        tapped = idle_tip(tip.frf or [], tip.frf_units, tip.frf_from_hz, tip.frf_correction or ())
         return believed_of_tap_test(tapped, cut.process(tooling.cutter).coefficients), tooling, None
     source = read_tip_source(files[0])
     if isinstance(source, LearntTip):

@@ -86,6 +86,16 @@ class TipOptions:
             help="Unit of the FRFs, as um/N, g/N, (m/s^2)/N; default: as the file states.", show_default=False, rich_help_panel=_TIP
         ),
     ] = None
+    frf_correction: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[X=]CORRECTION",
+            help="Of all FRFs or of one: reverse, conjugate, exchange (also conjugate-reverse, exchange-reverse), none; "
+            "default: what is certain is turned.",
+            show_default=False,
+            rich_help_panel=_TIP,
+        ),
+    ] = None
     frf_from_hz: Annotated[
         float | None,
         typer.Option(

@@ -55,6 +55,7 @@ def tap(
     estimator: Annotated[Estimator, typer.Option(help="H1, H2, or Hv: the geometric mean of both.")] = Estimator.h1,
     sensor_mass_g: Annotated[float, typer.Option(help="Mass of the sensor, g, at the point that is hit.")] = 0.0,
     rate_hz: Annotated[float | None, typer.Option(help="Sampling rate, Hz, of a file that tells none.", show_default=False)] = None,
+    reverse: Annotated[bool, typer.Option("--reverse", help="The sensor or the hammer is reversed: turn the sign.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Figure to write (png, svg, pdf).", show_default=False)] = None,
     json_: Json = False,
 ) -> None:
@@ -74,7 +75,7 @@ def tap(
     wanted = [name for name in (force, response) if name]
     opened = [open_recording(path, wanted, rate_hz) for path in hits]
     gains = force_sensitivity, response_sensitivity
-    found = tap_recordings(opened, force, response, quantity.value, HitEstimator(estimator), mass, axis.value, *gains)
+    found = tap_recordings(opened, force, response, quantity.value, HitEstimator(estimator), mass, axis.value, *gains, reverse)
     write_tap(out, found)
     if plot is not None:
         from rcsa_ident.report.tap import tap_figure

@@ -14,6 +14,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.passivity import Correction, judged, reciprocal
 from rcsa_ident.dynamics.receptance import MeasuredCurve, Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import AXES, FREQUENCY, read_frf_csv
@@ -58,6 +59,8 @@ class TapTest(NamedTuple):
         File and line.
     remarks : tuple of Remark
         What the file does not state and was assumed.
+    told : bool
+        Whether the file or the user says which quantity it is.
     """
 
     frequency: FloatArray
@@ -68,6 +71,7 @@ class TapTest(NamedTuple):
     point: str
     where: str
     remarks: tuple[Remark, ...] = ()
+    told: bool = True
 
 
 class Source(NamedTuple):
@@ -80,15 +84,18 @@ class Source(NamedTuple):
         Axes of response and force; None takes what the file names.
     record : int or None
         Number in the file, from 1.
+    correction : Correction
+        Of what the file holds.
     """
 
     path: Path
     pair: tuple[str, str] | None = None
     record: int | None = None
+    correction: Correction = Correction.AUTO
 
 
 def read_tap_tests(sources: Sequence[Source], units: str | None = None, from_hz: float = 0.0) -> dict[tuple[str, str], MeasuredCurve]:
-    """Return the tip's FRFs for each pair of axes (response, force).
+    """Return the tip's FRFs for each pair of axes (response, force); those that no tip can have are turned or remarked.
 
     Parameters
     ----------
@@ -111,8 +118,14 @@ def read_tap_tests(sources: Sequence[Source], units: str | None = None, from_hz:
             kept = test.frequency >= from_hz
             if np.count_nonzero(kept) < 2:
                 raise InputError("frf_from_hz", f"{from_hz:g}", f"a frequency below the last, {test.frequency[-1]:g} Hz", test.where)
-            said = (remark.of(f"FRF {pair_name(pair)}") for remark in test.remarks)
-            found[pair] = MeasuredCurve(test.frequency[kept], test.values[kept], said)
+            values, judgement = judged(test.frequency[kept], test.values[kept], source.correction, pair[0] == pair[1], test.told)
+            said = (remark.of(f"FRF {pair_name(pair)}") for remark in (*test.remarks, *judgement))
+            found[pair] = MeasuredCurve(test.frequency[kept], values, said)
+    for pair, curve in found.items():
+        other = found.get((pair[1], pair[0]))
+        if pair[0] < pair[1] and other is not None and np.array_equal(curve[0], other[0]):
+            differ = reciprocal(curve[0], curve[1], other[1], (pair_name(pair), pair_name((pair[1], pair[0]))))
+            found[pair] = MeasuredCurve(*curve, (*curve.remarks, *differ))
     return found
 
 
@@ -141,9 +154,9 @@ def read_frfs(path: str | Path, units: str | None = None) -> list[TapTest]:
             raise InputError("frf_units", units, "m/N, or no unit, for an FRF.csv", str(path))
         return _from_csv(path)
     found = []
-    for record, (frequency, values, own, axis, said) in enumerate(read_frf_text(raw, unit, str(path)), start=1):
+    for record, (frequency, values, own, axis, told, said) in enumerate(read_frf_text(raw, unit, str(path)), start=1):
         frequency, values = _receptance(frequency, values, own, str(path))
-        found.append(TapTest(frequency, values, axis[:1], axis[-1:], record, "", str(path), said))
+        found.append(TapTest(frequency, values, axis[:1], axis[-1:], record, "", str(path), said, told))
     return found
 
 

@@ -40,6 +40,8 @@ class TextFrf(NamedTuple):
     unit : FrfUnit
     axis : str
         X of a direct one, XY of one with the force in Y; empty where the file says none.
+    told : bool
+        Whether the file or the user says which quantity it is.
     remarks : tuple of Remark
         What the file does not state and was assumed, and which columns are not read.
     """
@@ -48,6 +50,7 @@ class TextFrf(NamedTuple):
     values: ComplexArray
     unit: FrfUnit
     axis: str
+    told: bool
     remarks: tuple[Remark, ...]
 
 
@@ -176,7 +179,8 @@ def _frfs(header: Header, table: FloatArray, unit: FrfUnit | None, where: str) -
         own, remarks = _unit(header, first[0], second[0], unit, where)
         values, assumed_ = _complex(first, second, own, pair[0] == "real", where)
         values = np.conj(values) if header.conjugated else values
-        frfs.append(TextFrf(frequency, values, own, axis, (*remarks, *assumed_, *said)))
+        told = bool(unit or first[0].unit or second[0].unit or header.unit or header.quantities or first[0].quantities)
+        frfs.append(TextFrf(frequency, values, own, axis, told, (*remarks, *assumed_, *said)))
     if unread:
         frfs = [each._replace(remarks=(*each.remarks, Remark(RecordCode.ASSUMED, f"not read: {listed(unread)}"))) for each in frfs]
     return frfs

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.passivity import Correction, judged
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.plausibility import RATE, SENSOR_MASS
 from rcsa_ident.remarks import Remark
@@ -16,6 +17,7 @@ from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.tap import HitEstimator, TapFrf, tap
 from rcsa_ident.signals.told_units import force_unit, is_untold, motion_unit, volts_in
 from rcsa_ident.signals.verdict import RecordCode, assumed
+from rcsa_ident.units import to_hz
 
 #: How many times as long as the hammer's pulses the other channels go on.
 _LONGER = 3.0
@@ -60,6 +62,7 @@ def tap_recordings(
     axis: str = "X",
     force_sensitivity: float | None = None,
     response_sensitivity: float | None = None,
+    reverse: bool = False,
 ) -> TapFrf:
     """Return the receptance that recordings of hits give together; its remarks say what was assumed.
 
@@ -77,6 +80,8 @@ def tap_recordings(
         Machine axis of hammer and response, X or Y.
     force_sensitivity, response_sensitivity : float or None
         Signal per newton and per SI unit of the response, of channels in volts or in a unit that is not known.
+    reverse : bool
+        The sensor or the hammer is reversed: the receptance is turned.
 
     Raises
     ------
@@ -99,7 +104,11 @@ def tap_recordings(
     if not rates or rates[-1] > (1.0 + _SAME_RATE) * rates[0]:
         raise InputError("sampling_rate_hz", ", ".join(f"{rate:g}" for rate in rates) or "no recording", "one rate for all recordings [Hz]")
     said += [each for each in (RATE.remark("sampling_rate_hz", RATE.checked("sampling_rate_hz", rates[0])),) if each is not None]
-    return replace(tap(rates[0], pairs, derivative, estimator, sensor_mass), axis=axis, remarks=tuple(said))
+    found = tap(rates[0], pairs, derivative, estimator, sensor_mass)
+    # where hammer and sensor were at two points, nobody knows the sign: it is turned where that was asked
+    turn = Correction.REVERSE if reverse else Correction.NONE
+    values, judgement = judged(to_hz(found.omega), found.receptance, turn)
+    return replace(found, receptance=values, axis=axis, remarks=(*said, *judgement))
 
 
 def _pair(recording: Opened, force: str | None, response: str | None) -> tuple[Channel, Channel, list[Remark]]:

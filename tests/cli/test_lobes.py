@@ -173,6 +173,7 @@ def test_process_options_reach_the_method(shop):
         (("--frf", "x.frf"), "--modes and --frf"),
         (("--frf-units", "um/N"), "given together with --frf"),
         (("--frf-from-hz", "50"), "given together with --frf"),
+        (("--frf-correction", "reverse"), "given together with --frf"),
         (("--feed-per-tooth-mm", 0), "--feed-per-tooth-mm"),
         (("--kac", 30), "--kac: found 30"),
         (("--stock", "block"), "--y-from-mm and --y-to-mm: found nothing"),

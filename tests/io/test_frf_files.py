@@ -133,7 +133,7 @@ def test_the_tip_is_hit_where_it_is_measured(tmp_path):
     records = [
         UffFunction(6, FREQUENCY, np.ones(FREQUENCY.size)),
         tip(XY, response=(7, 1), reference=(1, 1)),
-        tip(X, response=(1, 1), reference=(1, -1)),
+        tip(-X, response=(1, 1), reference=(1, -1)),
         tip(Y, response=(1, -2), reference=(1, -2)),
         tip(XY, response=(1, 1), reference=(1, 2)),
         tip(XY, response=(1, 3), reference=(1, 3)),
@@ -142,7 +142,8 @@ def test_the_tip_is_hit_where_it_is_measured(tmp_path):
     found = read_tap_tests([Source(path)])
     assert set(found) == {("X", "X"), ("Y", "Y"), ("X", "Y"), ("Z", "Z")}
     # a sensor that looks against the force
-    np.testing.assert_allclose(found["X", "X"][1], -X, rtol=1e-10)
+    np.testing.assert_allclose(found["X", "X"][1], X, rtol=1e-10)
+    assert found["X", "X"].remarks == ()
     np.testing.assert_allclose(found["Y", "Y"][1], Y, rtol=1e-10)
     chosen = read_tap_tests([Source(path, ("X", "X"), 2)])
     np.testing.assert_allclose(chosen["X", "X"][1], XY, rtol=1e-10)

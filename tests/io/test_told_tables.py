@@ -1,5 +1,7 @@
 """Recordings of a campaign whose text tells itself: a preamble with the rate, names, and units in a line of their own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
