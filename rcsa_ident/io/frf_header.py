@@ -25,7 +25,11 @@ _ROLE_OF = {word: role for role, words in ROLES.items() for word in words}
 #: Frequencies that are angular by their name alone.
 _ANGULAR = ("omega", "ω", "w", "kreisfrequenz", "angular", "circular")
 #: Words of a column's name that say nothing further.
-_FILLERS = ("part", "anteil", "frf", "h", "g", "of", "the", "spectral", "linear", "lin", "angular", "circular")
+_FILLERS = (
+    "part", "anteil", "frf", "of", "in", "the", "spectral", "linear", "lin", "angular", "circular", "transfer", "function", "dynamic", "mechanical",
+)  # fmt: skip
+#: A function's own name: H, H1, G12, H11.
+_FUNCTION = re.compile(r"[hg]?\d{0,3}")
 #: Quantities: how many times the motion is differentiated, and whether the force stands above it.
 QUANTITIES = {
     "receptance": (0, False), "compliance": (0, False), "flexibility": (0, False), "displacement/force": (0, False),
@@ -39,22 +43,20 @@ _AXIS = re.compile(r"[xyz]{1,2}")
 _QUANTITY = re.compile(
     r"\b(" + "|".join(sorted((q.replace(" ", r"\s+") for q in QUANTITIES), key=len, reverse=True)) + r")\b", re.IGNORECASE
 )
-#: e^{-iωt} and its like.
-_TIME = re.compile(
-    r"\be(?:xp)?\s*\^?\s*[({\[]?\s*(?P<sign>[+\-−]?)\s*[ij]\s*\*?\s*(?:ω|w|omega|2\s*\*?\s*pi\s*\*?\s*f)\s*\*?\s*t", re.IGNORECASE
-)
-_CONVENTION = re.compile(r"\b(?:time|sign|phase)\s+(?:convention|dependence)\b|\bconjugat", re.IGNORECASE)
+#: e^{-iωt}, exp(-j*2*pi*f*t) and their like.
+_TIME = re.compile(r"\b(?:exp\s*[({\[]|e\s*\^\s*[({\[]?)\s*(?P<sign>[+\-−]?)(?P<rest>[\w\s*·πω]*)", re.IGNORECASE)
+_CONVENTION = re.compile(r"\bconvention\b|\btime dependence\b|\bconjugat", re.IGNORECASE)
 _UNIT_LINE = re.compile(
     r"^\W*(?:(?P<of>frequency|abscissa|x[- ]axis|x)\s+)?(?:units?|einheit(?:en)?)\s*[:=]\s*(?P<units>.+)$", re.IGNORECASE
 )
 #: Words of columns that unnamed ones cannot have; the frequency and the parts of a complex number are what is assumed.
 _OTHERS = re.compile(r"\b(magnitude|amplitude|modulus|phase|dB|rad/s|kHz|deg(rees?)?)\b", re.IGNORECASE)
 _DECIBEL = re.compile(
-    r"^\s*dB\b\s*(?:(?:re|ref|rel)\b\.?\s*(?:to\s+)?:?)?\s*"
+    r"^\s*dB\b\s*(?:(?:re|ref|rel)\b\.?\s*(?:to\s+)?[:=]?)?\s*"
     r"(?:(?P<number>\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?=\s|$|\*))?\s*\*?\s*(?P<unit>.*)$",
     re.IGNORECASE,
 )
-_GROUP = re.compile(r"\s*(?:\[(?P<square>[^\[\]]*)\]|(?P<round>\((?:[^()]|\([^()]*\))*\))|\{(?P<curly>[^{}]*)\}|<(?P<angle>[^<>]*)>)")
+_GROUP = re.compile(r"\s*(?:\[[^\[\]]*\]|\((?:[^()]|\([^()]*\))*\)|\{[^{}]*\}|<[^<>]*>)")
 #: What a function is of: the H(f) of Re(H(f)).
 _ARGUMENT = re.compile(r"^[hgHG]?(?:\w{0,2}\d{0,3})(?:\(\s*[ij]?\s*[fωw]\s*\))?$")
 _BARS = re.compile(r"\|\s*[HGhg]\w{0,2}\s*(?:\(\w*\)\s*)?\|")
@@ -141,7 +143,7 @@ def read_header(lines: Sequence[str], tail: str, width: int, where: str) -> Head
     InputError
         Names what is said and not understood.
     """
-    above = [line for line in lines if line.strip()]
+    above = [line for line in lines if re.search(r"\w", line)]
     columns = _of_tail(tail, width, where) if tail.strip() else None
     if columns is None:
         columns, above = _named_columns(above, width, where)
@@ -167,7 +169,8 @@ def _refuse(found: str, where: str) -> NoReturn:
 def _named_columns(above: list[str], width: int, where: str) -> tuple[tuple[Column, ...] | None, list[str]]:
     """The columns that one of the last lines names, perhaps with a line of units below it, and the lines that are left."""
     for i in range(len(above) - 1, max(len(above) - 3, -1), -1):
-        if sum(_has_role(cell) for cell in _words(above[i])) < 2 or _UNIT_LINE.match(above[i]):
+        roles = sum(_has_role(word) for word in _words(above[i]))
+        if roles < (1 if len(_delimited(above[i], width)) == width else 2) or _UNIT_LINE.match(above[i]):
             continue
         cells, below = _cells(above[i], width), above[i + 1 :]
         if not any(_ROLE_OF.get(word.lower()) == "frequency" for word in _words(above[i])):
@@ -199,7 +202,12 @@ def _of_tail(tail: str, width: int, where: str) -> tuple[Column, ...]:
 
 
 def _words(line: str) -> list[str]:
-    return re.findall(r"[^\W\d_]+|#", _GROUP.sub(" ", _BARS.sub("magnitude", line)))
+    outside = _GROUP.sub(lambda group: f" {_inside(group)} " if _has_role(_inside(group)) else " ", _BARS.sub("magnitude", line))
+    return re.findall(r"[^\W\d_]+|#", outside)
+
+
+def _inside(group: re.Match[str]) -> str:
+    return group[0].strip()[1:-1].strip()
 
 
 def _has_role(word: str) -> bool:
@@ -210,12 +218,17 @@ def _cells(line: str, width: int) -> list[str]:
     """A line of names or units, cut into columns: by the delimiter that gives as many as there are, else at the words that begin one."""
     line = re.sub(r"^\s*(?:%|//|!|#(?=\s*\w{2}))+", "", line.replace('"', "")).strip()
     line = _BARS.sub("magnitude", line)
-    for delimiter in _DELIMITERS:
-        cells = [cell.strip() for cell in (re.split(r"\s{2,}", line) if delimiter == "  " else line.rstrip(delimiter).split(delimiter))]
-        if len(cells) == width:
-            return cells
     words = line.split()
-    return words if len(words) == width else _scanned(line)
+    return _delimited(line, width) or (words if len(words) == width else _scanned(line))
+
+
+def _delimited(line: str, width: int) -> list[str]:
+    """The cells by a delimiter that gives as many as there are columns; none without one."""
+    for delimiter in _DELIMITERS:
+        cells = re.split(r"\s{2,}", line.strip()) if delimiter == "  " else line.rstrip(delimiter).split(delimiter)
+        if len(cells) == width:
+            return [cell.strip() for cell in cells]
+    return []
 
 
 def _scanned(line: str) -> list[str]:
@@ -235,9 +248,11 @@ def _column(cell: str, where: str) -> Column:
     """A column by its name, with or without unit: ``Re(H) [m/N]``, ``Magnitude (dB re 1 m/N)``, ``freq_hz``, ``|H|``, ``f/Hz``."""
     name, units = cell, list[str]()
     while found := _GROUP.search(name):
-        inside = next(part for part in found.groups() if part is not None).strip()
-        inside = inside[1:-1].strip() if found["round"] else inside
+        inside = _inside(found)
         before = re.search(r"[^\W\d_]+$", name[: found.start()])
+        if _has_role(inside) and not any(_has_role(word) for word in re.findall(r"[^\W\d_]+", _GROUP.sub(" ", name))):
+            name = f"{name[: found.start()]} {inside} {name[found.end() :]}"
+            continue
         if not (before and _has_role(before[0]) and _ARGUMENT.match(inside) and _unit_of(_ROLE_OF[before[0].lower()], inside) is None):
             units.append(inside)
         name = name[: found.start()] + " " + name[found.end() :]
@@ -252,7 +267,7 @@ def _column(cell: str, where: str) -> Column:
             roles.append(_ROLE_OF[word])
         elif _AXIS.fullmatch(word):
             axis = word.upper()
-        elif word in _FILLERS or not word:
+        elif word in _FILLERS or _FUNCTION.fullmatch(word):
             continue
         elif "/" in word and _has_role(word.partition("/")[0]):
             roles.append(_ROLE_OF[word.partition("/")[0]])
@@ -264,7 +279,8 @@ def _column(cell: str, where: str) -> Column:
             _refuse(cell, where)
     if len(roles) == 2 and roles[1] == "frequency":
         roles = roles[1:] if roles[0] == "line number" else roles
-    roles = list(dict.fromkeys(roles))
+    # a quantity and nothing else is its magnitude
+    roles = list(dict.fromkeys(roles)) or ["magnitude"] * bool(quantities)
     units = [unit for unit in units if not is_untold(unit)]
     if len(roles) != 1 or len(units) > 1:
         _refuse(cell, where)
@@ -308,11 +324,11 @@ def _with_statements(header: Header, above: Sequence[str], where: str) -> Header
             for text in re.split(r"[,;]", units["units"]):
                 header = _with_file_unit(header, text.strip(" .\"'[]"), (units["of"] or "").lower(), where)
         elif header.unit is None:
-            texts = [next(g for g in m.groups() if g is not None) for m in _GROUP.finditer(line)] + re.split(r"[\s,;]+", line)
+            texts = [_inside(group) for group in _GROUP.finditer(line)] + re.split(r"[\s,;]+", line)
             header = replace(header, unit=next((unit for text in texts if "/" in text and (unit := frf_unit(text))), None))
         header = replace(header, quantities=(*header.quantities, *(" ".join(q.lower().split()) for q in _QUANTITY.findall(line))))
         time = _TIME.search(line)
-        if time:
+        if time and re.search(r"[ij].*t\s*$|^\s*[ij]", time["rest"], re.IGNORECASE):
             header = replace(header, conjugated=time["sign"] in ("-", "−"))
         elif _CONVENTION.search(line):
             raise InputError("FRF header", listed([line.strip()[:120]]), "the sign of time as e^(+iωt) or e^(-iωt)", where)
