@@ -26,8 +26,9 @@ _ROLE_OF = {word: role for role, words in ROLES.items() for word in words}
 _ANGULAR = ("omega", "ω", "w", "kreisfrequenz", "angular", "circular")
 #: Words of a column's name that say nothing further.
 _FILLERS = (
-    "part", "anteil", "frf", "of", "in", "the", "spectral", "linear", "lin", "angular", "circular", "transfer", "function", "dynamic", "mechanical",
-)  # fmt: skip
+    *("part", "anteil", "frf", "of", "in", "the", "spectral", "linear", "lin", "angular", "circular"),
+    *("transfer", "function", "dynamic", "mechanical"),
+)
 #: A function's own name: H, H1, G12, H11.
 _FUNCTION = re.compile(r"[hg]?\d{0,3}")
 #: Quantities: how many times the motion is differentiated, and whether the force stands above it.
