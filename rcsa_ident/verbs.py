@@ -187,12 +187,13 @@ def read_machine(path: str | Path) -> Machine:
     return read_flange_machine(path) if Path(path).suffix.lower() == ".csv" else read_result(path).machine
 
 
-def read_modes(path: str | Path) -> TipModes:
-    r"""Return the modes of a tip from MODES.toml; a direction without modes is rigid.
+def read_modes(path: str | Path, *further: str | Path) -> TipModes:
+    r"""Return the modes of a tip from MODES.toml, or from CutPro's modal files; a direction without modes is rigid.
 
     Parameters
     ----------
-    path : path
+    path, *further : path
+        MODES.toml, or one ``X=FILE.cmp`` for each direction.
 
     Examples
     --------
@@ -203,10 +204,10 @@ def read_modes(path: str | Path) -> TipModes:
     >>> print(ri.read_modes("MODES.toml"))
     tip: 1 mode at 900 Hz
     """
-    from rcsa_ident.io import modes
+    from rcsa_ident.io.modal_files import read_modes_files
     from rcsa_ident.stability.tip_modes import TipModes
 
-    return TipModes.of(modes.read_modes(path))
+    return TipModes.of(read_modes_files([str(each) for each in (path, *further)]).models)
 
 
 def read_tap_tests(

@@ -33,8 +33,8 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
     from rcsa_ident.machine.learnt_tip import LearntTip
     from rcsa_ident.machine.machine import Machine
 
-    own_tip = tip.modes is not None or bool(tip.frf)
-    if tip.modes is not None and tip.frf:
+    own_tip = bool(tip.modes or tip.frf)
+    if tip.modes and tip.frf:
         raise InputError("--modes and --frf", "both", "one of them")
     if tip.frf_units is not None and not tip.frf:
         raise InputError("--frf-units", tip.frf_units, "given together with --frf")
@@ -66,12 +66,12 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
 
 def _known_tip(options: TipOptions) -> TipSource:
     """What stands in the place of a machine: a modal model of the tip, or tap tests of it."""
-    from rcsa_ident.io.modes import read_modes_file
+    from rcsa_ident.io.modal_files import read_modes_files
     from rcsa_ident.machine.known_tip import KnownTip
     from rcsa_ident.stability.tip_modes import TipModes
 
-    if options.modes is not None:
-        found = read_modes_file(options.modes)
+    if options.modes:
+        found = read_modes_files(options.modes)
         return KnownTip(TipModes.of(found.models), found.coefficients)
     return KnownTip(idle_tip(options.frf or [], options.frf_units, options.frf_from_hz, options.frf_correction or ()))
 
