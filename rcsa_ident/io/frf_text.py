@@ -198,7 +198,7 @@ def _unit(header: Header, first: Column, second: Column, unit: FrfUnit | None, w
     if own is not None:
         if unit is None and len(meant) == 1 and (own.order, own.inverse) not in meant:
             found = f"{next(iter(meant.values()))} in a unit of {_NAMES[own.order, own.inverse]}"
-            raise InputError("FRF header", found, "a unit of what it is called, or the unit told with --frf-units", where)
+            raise InputError("FRF header", found, "a unit of what it is called, or the unit told", where)
         return own, ()
     order, inverse = next(iter(meant), (0, False))
     return FrfUnit(1.0, order, inverse), (assumed("the table", "", f"{_NAMES[order, inverse]} [{_SI[order, inverse]}]"),)
