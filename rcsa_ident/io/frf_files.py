@@ -19,8 +19,6 @@ from rcsa_ident.dynamics.receptance import MeasuredCurve, Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import AXES, FREQUENCY, read_frf_csv
 from rcsa_ident.io.files import MEGABYTE, read_bytes
-from rcsa_ident.io.frf_header import UNITS_ALLOWED
-from rcsa_ident.io.frf_text import read_frf_text
 from rcsa_ident.io.uff import (
     ACCELERATION,
     DISPLACEMENT,
@@ -35,7 +33,7 @@ from rcsa_ident.io.uff import (
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.machine.known_tip import measured_tip
 from rcsa_ident.remarks import Remark
-from rcsa_ident.signals.told_units import FrfUnit, force_unit, frf_unit, hertz_in, is_untold, motion_unit, quotient
+from rcsa_ident.signals.told_units import UNITS_ALLOWED, FrfUnit, force_unit, frf_unit, hertz_in, is_untold, motion_unit, quotient
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
 _KINDS = {DISPLACEMENT: 0, VELOCITY: 1, ACCELERATION: 2}
@@ -153,6 +151,9 @@ def read_frfs(path: str | Path, units: str | None = None) -> list[TapTest]:
         if unit not in (None, FrfUnit(1.0, 0)):
             raise InputError("frf_units", units, "m/N, or no unit, for an FRF.csv", str(path))
         return _from_csv(path)
+    # most tips come without a text, and its grammar takes as long to compile as to read one
+    from rcsa_ident.io.frf_text import read_frf_text
+
     found = []
     for record, (frequency, values, own, axis, told, said) in enumerate(read_frf_text(raw, unit, str(path)), start=1):
         frequency, values = _receptance(frequency, values, own, str(path))

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.signals.told_units import FrfUnit, frf_unit, hertz_in, is_untold, radians_in, told_unit
+from rcsa_ident.signals.told_units import UNITS_ALLOWED, FrfUnit, frf_unit, hertz_in, is_untold, radians_in, told_unit
 
 #: What a column may hold, and the words that say so, in small letters.
 ROLES = {
@@ -345,6 +345,3 @@ def _with_file_unit(header: Header, text: str, of: str, where: str) -> Header:
     if is_untold(text) or (radians_in(text) is not None and not of):
         return header
     raise InputError("unit in the header", listed([text[:60]]), "Hz, kHz or rad/s" if of else UNITS_ALLOWED, where)
-
-
-UNITS_ALLOWED = "motion over force or its inverse, as m/N, um/N, mm/N, in/lbf, m/s/N, m/s^2/N, g/N, 1/kg, N/m"

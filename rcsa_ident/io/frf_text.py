@@ -9,11 +9,11 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.frf_header import QUANTITIES, UNITS_ALLOWED, Column, Header, read_header
+from rcsa_ident.io.frf_header import QUANTITIES, Column, Header, read_header
 from rcsa_ident.io.text_columns import decoded
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
-from rcsa_ident.signals.told_units import FrfUnit
+from rcsa_ident.signals.told_units import UNITS_ALLOWED, FrfUnit
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
 #: Last frequency [Hz] below which more lines than hertz are samples over time.

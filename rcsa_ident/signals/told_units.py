@@ -68,6 +68,8 @@ _SYMBOLS: dict[str, tuple[float, Powers, tuple[str, ...]]] = {
     **dict.fromkeys(("rpm", "cpm"), (1.0 / 60.0, _FREQUENCY, ())),
     **dict.fromkeys(("rev", "cycle", "cycles"), (1.0, (0, 0, 0, 0, 0, 1), ())),
 }
+#: Units of FRFs in the words of messages.
+UNITS_ALLOWED = "motion over force or its inverse, as m/N, um/N, mm/N, in/lbf, m/s/N, m/s^2/N, g/N, 1/kg, N/m"
 #: Letters of a unit, at most.
 _LONGEST = 80
 #: What stands in the place of a unit where a file says none.
