@@ -174,7 +174,7 @@ def _named_columns(above: list[str], width: int, where: str) -> tuple[tuple[Colu
         if roles < (1 if len(_delimited(above[i], width)) == width else 2) or _UNIT_LINE.match(above[i]):
             continue
         cells, below = _cells(above[i], width), above[i + 1 :]
-        if not any(_ROLE_OF.get(word.lower()) == "frequency" for word in _words(above[i])):
+        if not any(_role(word) == "frequency" for word in _words(above[i])):
             _refuse(above[i].strip(), where)
         if len(cells) != width:
             _refuse(f"{len(cells)} names for {width} columns: {above[i].strip()}", where)
@@ -212,7 +212,12 @@ def _inside(group: re.Match[str]) -> str:
 
 
 def _has_role(word: str) -> bool:
-    return word.strip(".,:").lower() in _ROLE_OF
+    return bool(_role(word))
+
+
+def _role(word: str) -> str:
+    """What a word says that a column holds; empty where it says nothing of it."""
+    return _ROLE_OF.get(word.strip(".,:").lower(), "")
 
 
 def _cells(line: str, width: int) -> list[str]:
@@ -254,7 +259,7 @@ def _column(cell: str, where: str) -> Column:
         if _has_role(inside) and not any(_has_role(word) for word in re.findall(r"[^\W\d_]+", _GROUP.sub(" ", name))):
             name = f"{name[: found.start()]} {inside} {name[found.end() :]}"
             continue
-        if not (before and _has_role(before[0]) and _ARGUMENT.match(inside) and _unit_of(_ROLE_OF[before[0].lower()], inside) is None):
+        if not (before and _has_role(before[0]) and _ARGUMENT.match(inside) and _unit_of(_role(before[0]), inside) is None):
             units.append(inside)
         name = name[: found.start()] + " " + name[found.end() :]
     sign = -1.0 if re.match(r"\s*[-−]\s*\w", name) else 1.0
@@ -265,13 +270,13 @@ def _column(cell: str, where: str) -> Column:
         word = token.strip(".,:").lower()
         angular = angular or word in _ANGULAR
         if _has_role(word):
-            roles.append(_ROLE_OF[word])
+            roles.append(_role(word))
         elif _AXIS.fullmatch(word):
             axis = word.upper()
         elif word in _FILLERS or _FUNCTION.fullmatch(word):
             continue
         elif "/" in word and _has_role(word.partition("/")[0]):
-            roles.append(_ROLE_OF[word.partition("/")[0]])
+            roles.append(_role(word.partition("/")[0]))
             angular = angular or word.partition("/")[0] in _ANGULAR
             units.append(token.partition("/")[2])
         elif told_unit(token) is not None or word == "db":

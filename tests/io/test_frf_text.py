@@ -210,6 +210,7 @@ def test_what_is_not_said_is_remarked(tmp_path):
         ("Frequency (Hz)\tReal (m/N)\tQuality", "Quality"),
         ("Frequency (Hz)\tReal (m/N)\tImag (m/s/N)", "two quantities"),
         ("Frequency (Hz)\tFirst\tSecond", "First"),
+        ("f../Hz\tReal.../furlong\tImag", "furlong"),
         ("Frequency (Hz)\tReal (m/N)\tImag (m/N)\tCoherence", "4 names for 3 columns"),
         ("Time (s)\tReal (m/N)\tImag (m/N)", "Time (s)"),
         ("Magnitude and phase of the tip", "Magnitude and phase"),
