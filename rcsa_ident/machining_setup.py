@@ -17,6 +17,7 @@ from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion, engagement_with
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, RUNOUT, SPINDLE_SPEED, remarks_of
 from rcsa_ident.remarks import Remark
@@ -353,6 +354,8 @@ class HammerTest(Shown):
         Lines that are used.
     error : float [-]
         Standard deviation of each line beside its noise, as a share.
+    correction : Correction
+        Of an FRF that was measured with a reversed sensor, or written conjugated.
     """
 
     id: str
@@ -367,6 +370,7 @@ class HammerTest(Shown):
     sensor_mass: float = 0.0
     band: tuple[float, float] = (0.0, np.inf)
     error: float = 0.02
+    correction: Correction = Correction.AUTO
 
     def __str__(self) -> str:
         points = (

@@ -86,6 +86,9 @@ def tap(
     sensor_mass: float = 0.0,
     axis: str = "X",
     rate: float | None = None,
+    force_sensitivity: float | None = None,
+    response_sensitivity: float | None = None,
+    reverse: bool = False,
 ) -> TapFrf:
     """Return the receptance of a structure that was hit by a hammer; double hits, overloads and others are left out and named.
 
@@ -105,6 +108,10 @@ def tap(
         Machine axis of hammer and response, X or Y.
     rate : float, optional [Hz]
         Of files that tell none.
+    force_sensitivity, response_sensitivity : float, optional
+        Signal per newton and per SI unit of the response, as 0.0102 V per m/s²; of channels in volts or in a unit that is not known.
+    reverse : bool
+        The sensor or the hammer is reversed: the receptance is turned.
 
     Raises
     ------
@@ -130,7 +137,8 @@ def tap(
         raise InputError("axis", axis, "X or Y")
     opened = [open_recording(path, [name for name in (force, response) if name], rate) for path in recordings]
     with threadpool_limits(1):
-        return tap_recordings(opened, force, response, quantity, HitEstimator(estimator), sensor_mass, axis)
+        gains = force_sensitivity, response_sensitivity
+        return tap_recordings(opened, force, response, quantity, HitEstimator(estimator), sensor_mass, axis, *gains, reverse)
 
 
 def ring(

@@ -187,12 +187,13 @@ def read_machine(path: str | Path) -> Machine:
     return read_flange_machine(path) if Path(path).suffix.lower() == ".csv" else read_result(path).machine
 
 
-def read_modes(path: str | Path) -> TipModes:
-    r"""Return the modes of a tip from MODES.toml; a direction without modes is rigid.
+def read_modes(path: str | Path, *further: str | Path) -> TipModes:
+    r"""Return the modes of a tip from MODES.toml, or from CutPro's modal files; a direction without modes is rigid.
 
     Parameters
     ----------
-    path : path
+    path, *further : path
+        MODES.toml, or one ``X=FILE.cmp`` for each direction.
 
     Examples
     --------
@@ -203,10 +204,10 @@ def read_modes(path: str | Path) -> TipModes:
     >>> print(ri.read_modes("MODES.toml"))
     tip: 1 mode at 900 Hz
     """
-    from rcsa_ident.io import modes
+    from rcsa_ident.io.modal_files import read_modes_files
     from rcsa_ident.stability.tip_modes import TipModes
 
-    return TipModes.of(modes.read_modes(path))
+    return TipModes.of(read_modes_files([str(each) for each in (path, *further)]).models)
 
 
 def read_tap_tests(
@@ -216,6 +217,7 @@ def read_tap_tests(
     yx: str | Path | None = None,
     units: str | None = None,
     from_hz: float = 0.0,
+    correction: str = "auto",
 ) -> Receptance:
     """Return a tip's receptance from tap tests: FRF.csv, UFF 58, CutPro- or MetalMAX-style text columns.
 
@@ -229,6 +231,8 @@ def read_tap_tests(
         As ``um/N`` or ``(m/s^2)/N``, whatever the files say; by default as they say.
     from_hz : float [Hz]
         Lines below it are left out: there, an accelerometer's drift is larger than what moves.
+    correction : str
+        reverse, conjugate or exchange, for a reversed sensor or hammer, e^{-iωt}, exchanged columns; none; auto turns what is certain.
 
     Examples
     --------
@@ -239,10 +243,12 @@ def read_tap_tests(
     >>> print(ri.read_tap_tests(y=tip, from_hz=50.0))
     tip.x, tip.y: 12545 frequencies, 51 to 25600 Hz
     """
+    from rcsa_ident.dynamics.passivity import correction_of
     from rcsa_ident.io.frf_files import Source, read_tapped_tip
 
     given = {("X", "X"): x, ("Y", "Y"): y, ("X", "Y"): xy, ("Y", "X"): yx}
-    return read_tapped_tip([Source(Path(path), pair) for pair, path in given.items() if path is not None], units, from_hz)
+    turn = correction_of(correction)
+    return read_tapped_tip([Source(Path(path), pair, None, turn) for pair, path in given.items() if path is not None], units, from_hz)
 
 
 def advise(

@@ -206,7 +206,8 @@ class Client(Uploads, Jobs):
         return read(ListenAnswer, answer)
 
     def tap(self, *hits: Path, **further: Any) -> TapAnswer:
-        """Return the receptance of hammer hits; options axis, force, response, quantity, estimator, sensor_mass_g, rate_hz."""
+        """Return the receptance of hammer hits; options axis, force, response, quantity, estimator, sensor_mass_g, rate_hz,
+        force_sensitivity, response_sensitivity, reverse."""
         return read(TapAnswer, self._tap(hits, further, "application/json"))
 
     def tap_file(self, *hits: Path, uff: bool = False, **further: Any) -> str:

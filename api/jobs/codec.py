@@ -21,6 +21,7 @@ NOUNS = {
     "Dof": "rcsa_ident.dynamics.coordinates.Dof",
     "Remark": "rcsa_ident.remarks.Remark",
     "RecordCode": "rcsa_ident.signals.verdict.RecordCode",
+    "FrfCode": "rcsa_ident.dynamics.passivity.FrfCode",
     "IdentificationCode": "rcsa_ident.identification.result.IdentificationCode",
     "PlausibilityCode": "rcsa_ident.plausibility.PlausibilityCode",
     "FlangeCode": "rcsa_ident.machine.measured.FlangeCode",

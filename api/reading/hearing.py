@@ -64,13 +64,16 @@ def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:
     Parameters
     ----------
     asked : mapping
-        The query's parameters by name: axis, force, response, quantity, estimator, sensor_mass_g, rate_hz; and file, a suffix.
+        The query's parameters by name: axis, force, response, quantity, estimator, sensor_mass_g, rate_hz,
+        force_sensitivity, response_sensitivity, reverse; and file, a suffix.
     *hits : Upload
         All with one target.
     """
     wanted = [name for name in (asked["force"], asked["response"]) if name is not None]
     opened = [_opened(hit.path, hit.name, wanted, asked["rate_hz"]) for hit in hits]
-    chosen = {name: asked[name] for name in ("force", "response", "quantity", "axis")}
+    chosen = {
+        name: asked[name] for name in ("force", "response", "quantity", "axis", "force_sensitivity", "response_sensitivity", "reverse")
+    }
     found = tap_recordings(opened, **chosen, estimator=HitEstimator(asked["estimator"]), sensor_mass=1e-3 * asked["sensor_mass_g"])
     if asked["file"]:
         # the suffix says how, and a target has none

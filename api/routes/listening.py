@@ -34,6 +34,9 @@ _MOST_HITS = 50
 _WORD = r"^[^\x00-\x1f\x7f]{1,128}$"
 Name = Annotated[str, Query(max_length=300, description="Name of the file, where the body is one; its suffix is the format.")]
 Word = Annotated[str | None, Query(pattern=_WORD)]
+Sensitivity = Annotated[
+    float | None, Query(gt=0, allow_inf_nan=False, description="Signal per SI unit of a channel in volts or in an unknown unit.")
+]
 Speed = Annotated[float | None, Query(ge=SPINDLE_SPEED.possible[0], le=SPINDLE_SPEED.possible[1], allow_inf_nan=False)]
 Rate = Annotated[
     float | None, Query(ge=RATE.possible[0], le=RATE.possible[1], allow_inf_nan=False, description="Of a file that tells none.")
@@ -112,12 +115,16 @@ async def tap(
         float, Query(ge=0, le=SENSOR_MASS.possible[1], allow_inf_nan=False, description="Of a sensor at the point that is hit.")
     ] = 0.0,
     rate_hz: Rate = None,
+    force_sensitivity: Sensitivity = None,
+    response_sensitivity: Sensitivity = None,
+    reverse: Annotated[bool, Query(description="The sensor or the hammer is reversed: turn the sign.")] = False,
 ) -> Any:
     accept = request.headers.get("accept", "")
     kind, suffix = next(((kind, suffix) for kind, suffix in ((CSV, ".csv"), (UFF, ".uff")) if kind in accept), (JSON, ""))
     asked = {
         "axis": axis, "force": force, "response": response, "quantity": quantity, "estimator": estimator, "sensor_mass_g": sensor_mass_g,
-        "rate_hz": rate_hz, "file": suffix,
+        "rate_hz": rate_hz, "force_sensitivity": force_sensitivity, "response_sensitivity": response_sensitivity,
+        "reverse": reverse, "file": suffix,
     }  # fmt: skip
     target: Path = await run_in_threadpool(components.files.spare, caller.group)
     try:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from api.schemas.common import Answer, Body, EngagementRows, Fault, Line
+from api.schemas.common import CORRECTION, Answer, Body, CorrectionName, EngagementRows, Fault, Line
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
 from rcsa_ident.dynamics.coordinates import Dof
@@ -172,6 +172,7 @@ class HammerTestKeys(Body):
     from_hz: float | None = None
     to_hz: float | None = None
     error_percent: float | None = Field(None, description="By how much each line may be wrong beside its noise; 2 if left out.")
+    correction: CorrectionName | None = Field(None, description=CORRECTION)
 
 
 class NewCampaign(Body):

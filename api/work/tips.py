@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.frf_files import Source, read_tapped_tip
 from rcsa_ident.machine.known_tip import KnownTip
@@ -35,7 +36,7 @@ def tapped(text: str) -> KnownTip:
         for path, each in zip(map(Path, places), told["frf"], strict=True):
             path.write_bytes(each["text"].encode())
             axes = each["axes"]
-            sources.append(Source(path, None if axes is None else (axes[0], axes[-1]), each["record"]))
+            sources.append(Source(path, None if axes is None else (axes[0], axes[-1]), each["record"], Correction(each["correction"])))
         try:
             return KnownTip(read_tapped_tip(sources, told["units"], told["from_hz"]))
         except InputError as error:

@@ -223,8 +223,8 @@ def _name_tests(
 
 def _machine_of(machine: TipSource, files: Sequence[Path], tip: TipOptions) -> str:
     """What takes the toolings, in words."""
-    if tip.modes is not None or tip.frf:
-        return f"the tip itself, of {tip.modes or ', '.join(tip.frf or [])}"
+    if tip.modes or tip.frf:
+        return f"the tip itself, of {', '.join(tip.modes or tip.frf or [])}"
     return f"{machine}, of {files[0].name}"
 
 

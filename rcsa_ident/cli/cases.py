@@ -37,6 +37,7 @@ def cases(
 ) -> None:
     """Count tested cuts of several toolings and cuts beside the lobes, and draw all of them in one figure."""
     from rcsa_ident.io.cases import read_cases
+    from rcsa_ident.io.tested_cuts import left_aside
     from rcsa_ident.report.lobes import Judged, Panel, cases_figure, save_figure
     from rcsa_ident.report.summaries import tally_summary
     from rcsa_ident.workflows.tool_change import classify_tested_cuts
@@ -56,8 +57,10 @@ def cases(
             change = change_of(machine, case.tooling, cut, speeds, False, 0.0)
             lobes = change.limits()
             remarks += [f"{case.name}: {remark}" for remark in change.remarks(lobes)]
+            remarks += [] if case.tests is None else [f"{case.name}: {remark}" for remark in left_aside(case.tests)]
             own = None if case.cuts is None else classify_tested_cuts(change, case.cuts)
-            idle, others = _idle(case, change) if case.idle else (None, {})
+            idle, others, said = _idle(case, change) if case.idle else (None, {}, ())
+            remarks += [f"{case.name}, from tap tests: {remark}" for remark in said]
             panels.append(Panel(case.name, lobes, others, None if case.cuts is None or own is None else Judged(case.cuts, own)))
             rows.append((case.name, own, idle))
     if plot is not None:
@@ -82,8 +85,8 @@ def cases(
         say(f"drawn: {plot}")
 
 
-def _idle(case: Case, change: ToolChange) -> tuple[Tally | None, dict[str, FloatArray]]:
-    """What tap tests of the same tooling say of its cuts."""
+def _idle(case: Case, change: ToolChange) -> tuple[Tally | None, dict[str, FloatArray], tuple[str, ...]]:
+    """What tap tests of the same tooling say of its cuts, and what is to be said of them."""
     from rcsa_ident.machine.known_tip import KnownTip
     from rcsa_ident.workflows.tool_change import classify_tested_cuts
 
@@ -92,6 +95,7 @@ def _idle(case: Case, change: ToolChange) -> tuple[Tally | None, dict[str, Float
     cut = replace(
         change.cut, coefficients={"tangential": process.coefficients.tangential, "radial_ratio": process.coefficients.radial_ratio}
     )
-    idle = replace(change, machine=KnownTip(idle_tip(case.idle)), cut=cut)
+    machine = KnownTip(idle_tip(case.idle))
+    idle = replace(change, machine=machine, cut=cut)
     tally = None if case.cuts is None else classify_tested_cuts(idle, case.cuts)
-    return tally, {"from tap tests": idle.limits().limit_depth}
+    return tally, {"from tap tests": idle.limits().limit_depth}, machine.remarks

@@ -33,13 +33,15 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
     from rcsa_ident.machine.learnt_tip import LearntTip
     from rcsa_ident.machine.machine import Machine
 
-    own_tip = tip.modes is not None or bool(tip.frf)
-    if tip.modes is not None and tip.frf:
+    own_tip = bool(tip.modes or tip.frf)
+    if tip.modes and tip.frf:
         raise InputError("--modes and --frf", "both", "one of them")
     if tip.frf_units is not None and not tip.frf:
         raise InputError("--frf-units", tip.frf_units, "given together with --frf")
     if tip.frf_from_hz is not None and not tip.frf:
         raise InputError("--frf-from-hz", f"{tip.frf_from_hz:g}", "given together with --frf")
+    if tip.frf_correction and not tip.frf:
+        raise InputError("--frf-correction", tip.frf_correction[0], "given together with --frf")
     if own_tip and stickouts is not None:
         raise InputError("--stickout-mm", stickouts, "a machine that takes any tooling: --modes and --frf are one stickout's")
     fewest, highest = (1, 1) if own_tip else (2, 1 + most)
@@ -64,21 +66,31 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
 
 def _known_tip(options: TipOptions) -> TipSource:
     """What stands in the place of a machine: a modal model of the tip, or tap tests of it."""
-    from rcsa_ident.io.modes import read_modes_file
+    from rcsa_ident.io.modal_files import read_modes_files
     from rcsa_ident.machine.known_tip import KnownTip
     from rcsa_ident.stability.tip_modes import TipModes
 
-    if options.modes is not None:
-        found = read_modes_file(options.modes)
+    if options.modes:
+        found = read_modes_files(options.modes)
         return KnownTip(TipModes.of(found.models), found.coefficients)
-    return KnownTip(idle_tip(options.frf or [], options.frf_units, options.frf_from_hz))
+    return KnownTip(idle_tip(options.frf or [], options.frf_units, options.frf_from_hz, options.frf_correction or ()))
 
 
-def idle_tip(texts: Sequence[str], units: str | None = None, from_hz: float | None = None) -> Receptance:
-    """Return the tip's receptance from tap tests, each written as with --frf."""
+def idle_tip(texts: Sequence[str], units: str | None = None, from_hz: float | None = None, corrections: Sequence[str] = ()) -> Receptance:
+    """Return the tip's receptance from tap tests, each written as with --frf, and corrected as with --frf-correction."""
+    from rcsa_ident.dynamics.passivity import correction_of
     from rcsa_ident.io.frf_files import read_tapped_tip
 
-    return read_tapped_tip([frf_source(text) for text in texts], units, from_hz or 0.0)
+    sources = [frf_source(text) for text in texts]
+    for text in corrections:
+        axes, _, name = text.rpartition("=")
+        pair = (axes.upper()[:1], axes.upper()[-1:])
+        chosen = [k for k, source in enumerate(sources) if not axes or source.pair == pair]
+        if not chosen:
+            raise InputError("--frf-correction", text, f"the direction of an FRF that is given as --frf {axes}=FILE")
+        for k in chosen:
+            sources[k] = sources[k]._replace(correction=correction_of(name, "--frf-correction"))
+    return read_tapped_tip(sources, units, from_hz or 0.0)
 
 
 def frf_source(text: str) -> Any:

@@ -96,7 +96,7 @@ def learn(
     from rcsa_ident.cli.learn_toolings import New, learn_from_campaign, learn_from_taps
     from rcsa_ident.io.learnt_tips import believed as told
     from rcsa_ident.io.learnt_tips import write_learnt_tip
-    from rcsa_ident.io.tested_cuts import read_tested_cuts, unused_columns
+    from rcsa_ident.io.tested_cuts import left_aside, read_tested_cuts
     from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts
 
@@ -118,7 +118,7 @@ def learn(
     writable(out)
     spec = cut_of(cut)
     cuts = read_tested_cuts(tests)
-    remarks = [f"{tests}: the column {name} is left aside" for name in unused_columns(tests)]
+    remarks = left_aside(tests)
     belief, tooling, earlier = believed_of(files, tip, spec, stiffness_spread)
     number = len(cuts.verdict)
     if earlier is not None:
@@ -154,13 +154,13 @@ def believed_of(
 ) -> tuple[Believed, Tooling, LearntTip | None]:
     """Return what is believed before further labels, the tooling, and the tip that earlier labels have taught, if there is one."""
     from rcsa_ident.cli.results import read_tip_source
-    from rcsa_ident.io.modes import read_modes_file
+    from rcsa_ident.io.modal_files import read_modes_files
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.machine.learnt_tip import LearntTip
     from rcsa_ident.workflows.learn_from_cuts import Believed, believed_of_learnt, believed_of_machine, believed_of_tap_test
 
-    alone = tip.modes is not None or bool(tip.frf)
-    if tip.modes is not None and tip.frf:
+    alone = bool(tip.modes or tip.frf)
+    if tip.modes and tip.frf:
         raise InputError("--modes and --frf", "both", "one of them")
     if len(files) != (1 if alone else 2):
         wanted = (
@@ -169,15 +169,15 @@ def believed_of(
             else "RESULT.json, MODES.toml or LEARNT.json, then TOOLING.toml (or --modes or --frf and TOOLING.toml)"
         )
         raise InputError("files", counted(len(files), "file"), wanted)
-    modes = tip.modes if tip.modes is not None else files[0] if not alone and files[0].suffix.lower() == ".toml" else None
-    if modes is not None:
-        found = read_modes_file(modes)
+    modes = tip.modes or ([str(files[0])] if not alone and files[0].suffix.lower() == ".toml" else [])
+    if modes:
+        found = read_modes_files(modes)
         tooling = read_tooling(files[-1], tip_known=True)
         own = None if found.coefficients is not None else cut.process(tooling.cutter).coefficients
         return Believed(*found.uncertain_tip(own)), tooling, None
     if alone:
         tooling = read_tooling(files[0], tip_known=True)
-        tapped = idle_tip(tip.frf or [], tip.frf_units, tip.frf_from_hz)
+        tapped = idle_tip(tip.frf or [], tip.frf_units, tip.frf_from_hz, tip.frf_correction or ())
         return believed_of_tap_test(tapped, cut.process(tooling.cutter).coefficients), tooling, None
     source = read_tip_source(files[0])
     if isinstance(source, LearntTip):

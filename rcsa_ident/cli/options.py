@@ -68,8 +68,13 @@ class TipOptions:
     """Where the tip's dynamics come from, in place of a machine."""
 
     modes: Annotated[
-        Path | None,
-        typer.Option(help="MODES.toml: a modal model of the tip instead of a result.", show_default=False, rich_help_panel=_TIP),
+        list[str] | None,
+        typer.Option(
+            metavar="[X=]FILE",
+            help="A modal model of the tip instead of a result: MODES.toml, or CutPro's X=FILE.cmp, one per axis.",
+            show_default=False,
+            rich_help_panel=_TIP,
+        ),
     ] = None
     frf: Annotated[
         list[str] | None,
@@ -84,6 +89,16 @@ class TipOptions:
         str | None,
         typer.Option(
             help="Unit of the FRFs, as um/N, g/N, (m/s^2)/N; default: as the file states.", show_default=False, rich_help_panel=_TIP
+        ),
+    ] = None
+    frf_correction: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[X=]CORRECTION",
+            help="Of all FRFs or of one: reverse, conjugate, exchange (also conjugate-reverse, exchange-reverse), none; "
+            "default: what is certain is turned.",
+            show_default=False,
+            rich_help_panel=_TIP,
         ),
     ] = None
     frf_from_hz: Annotated[

@@ -46,9 +46,16 @@ def tap(
     quantity: Annotated[
         Response, typer.Option(help="What the response measures, in SI, where its unit does not say.")
     ] = Response.acceleration,
+    force_sensitivity: Annotated[
+        float | None, typer.Option(help="Signal per newton of a hammer in volts or in an unknown unit.", show_default=False)
+    ] = None,
+    response_sensitivity: Annotated[
+        float | None, typer.Option(help="Signal per SI unit of a response in volts or in an unknown unit.", show_default=False)
+    ] = None,
     estimator: Annotated[Estimator, typer.Option(help="H1, H2, or Hv: the geometric mean of both.")] = Estimator.h1,
     sensor_mass_g: Annotated[float, typer.Option(help="Mass of the sensor, g, at the point that is hit.")] = 0.0,
     rate_hz: Annotated[float | None, typer.Option(help="Sampling rate, Hz, of a file that tells none.", show_default=False)] = None,
+    reverse: Annotated[bool, typer.Option("--reverse", help="The sensor or the hammer is reversed: turn the sign.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Figure to write (png, svg, pdf).", show_default=False)] = None,
     json_: Json = False,
 ) -> None:
@@ -67,7 +74,8 @@ def tap(
     mass = 1e-3 * non_negative("--sensor-mass-g", sensor_mass_g, "g")
     wanted = [name for name in (force, response) if name]
     opened = [open_recording(path, wanted, rate_hz) for path in hits]
-    found = tap_recordings(opened, force, response, quantity.value, HitEstimator(estimator), mass, axis.value)
+    gains = force_sensitivity, response_sensitivity
+    found = tap_recordings(opened, force, response, quantity.value, HitEstimator(estimator), mass, axis.value, *gains, reverse)
     write_tap(out, found)
     if plot is not None:
         from rcsa_ident.report.tap import tap_figure

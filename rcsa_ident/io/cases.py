@@ -32,6 +32,8 @@ class Case(NamedTuple):
     cuts : TestedCuts or None
     idle : tuple of str
         Tap-test FRFs of this tooling, each as ``X=FILE``, ``Y=FILE`` or ``FILE``.
+    tests : Path or None
+        The file of the cuts.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Case(NamedTuple):
     feed_per_tooth: float | None
     cuts: TestedCuts | None
     idle: tuple[str, ...]
+    tests: Path | None = None
 
 
 def read_cases(path: str | Path) -> list[Case]:
@@ -86,6 +89,7 @@ def _case(table: Table, folder: Path, toolings: Callable[[Path], Tooling], tests
         table.refuse("idle", f"{idle!r}", allowed)
     if not all(text.strip() for text in idle):
         table.refuse("idle", "an empty text", allowed)
+    file = folder / table.text("tests") if "tests" in table else None
     feed = table.quantity("feed_per_tooth_mm", FEED_PER_TOOTH, None)
     return Case(
         table.text("name", f"case {number}"),
@@ -93,8 +97,9 @@ def _case(table: Table, folder: Path, toolings: Callable[[Path], Tooling], tests
         engagement_of(table, tooling.cutter, lambda own, key: folder / own.text(key)),
         feed_angle_of(table) if "feed_direction" in table else 0.0,
         None if feed is None else feed * 1e-3,
-        tests(folder / table.text("tests")) if "tests" in table else None,
+        None if file is None else tests(file),
         tuple(_beside(text, folder) for text in idle),
+        file,
     )
 
 

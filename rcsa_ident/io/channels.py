@@ -55,8 +55,6 @@ class StoredChannel:
         return self.read(0, self.size)
 
 
-#: Units of a signal before its sensitivity, in volts.
-VOLTAGES = {"V": 1.0, "mV": 1e-3}
 #: A channel's samples: an array, or what reads parts of one.
 Channel = FloatArray | StoredChannel
 
@@ -71,14 +69,21 @@ class Signals(list[Channel]):
     units : tuple of (str, Quantity or None)
         The unit that the file says of each channel, and what it measures: samples of a known quantity are in SI already, those of a voltage
         in volts. Empty where the file says none.
+    stored : tuple of str
+        The unit that the file says of each channel whose samples stand in it, not in SI. Empty where the file says none.
     """
 
     def __init__(
-        self, channels: Sequence[Channel], notes: tuple[Remark, ...] = (), units: tuple[tuple[str, Quantity | None], ...] = ()
+        self,
+        channels: Sequence[Channel],
+        notes: tuple[Remark, ...] = (),
+        units: tuple[tuple[str, Quantity | None], ...] = (),
+        stored: tuple[str, ...] = (),
     ) -> None:
         super().__init__(channels)
         self.notes = notes
         self.units = units
+        self.stored = stored
 
 
 def notes_of(channels: Sequence[Channel]) -> tuple[Remark, ...]:

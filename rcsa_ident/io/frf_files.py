@@ -1,11 +1,10 @@
-"""Tap-test FRFs: FRF.csv, universal files, CutPro- and MetalMAX-style text columns; all become receptances in m/N.
+"""Tap-test FRFs: FRF.csv, universal files, text columns (`frf_text`); all become receptances in m/N.
 
 Universal files are read by `rcsa_ident.io.uff`: a file of one's own needs no extra package.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from itertools import permutations
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.passivity import Correction, judged, reciprocal
 from rcsa_ident.dynamics.receptance import MeasuredCurve, Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import AXES, FREQUENCY, read_frf_csv
@@ -33,24 +33,11 @@ from rcsa_ident.io.uff import (
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.machine.known_tip import measured_tip
 from rcsa_ident.remarks import Remark
+from rcsa_ident.signals.told_units import UNITS_ALLOWED, FrfUnit, force_unit, frf_unit, hertz_in, is_untold, motion_unit, quotient
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
-_STANDARD_GRAVITY = 9.80665
-_INCH = 0.0254
-#: A unit: how many SI units it is, and how many times it was differentiated by time.
-MOTIONS = {
-    "m": (1.0, 0), "cm": (1e-2, 0), "mm": (1e-3, 0), "um": (1e-6, 0), "micron": (1e-6, 0), "nm": (1e-9, 0), "in": (_INCH, 0),
-    "m/s": (1.0, 1), "mm/s": (1e-3, 1), "in/s": (_INCH, 1),
-    "m/s2": (1.0, 2), "mm/s2": (1e-3, 2), "g": (_STANDARD_GRAVITY, 2), "in/s2": (_INCH, 2),
-}  # fmt: skip
-FORCES = {"n": 1.0, "kn": 1e3, "lbf": 4.4482216152605, "lb": 4.4482216152605}
-UNITS_ALLOWED = "motion over force, as m/N, um/N, mm/N, in/lbf, m/s/N, m/s^2/N, g/N"
 _KINDS = {DISPLACEMENT: 0, VELOCITY: 1, ACCELERATION: 2}
 _LARGEST = 128 * MEGABYTE
-#: Last frequency [Hz] below which more lines than hertz are samples over time.
-_LOWEST_END = 60.0
-#: Lines of names and remarks in front of the numbers of a text file.
-_MOST_HEADER = 200
 
 
 class TapTest(NamedTuple):
@@ -70,6 +57,8 @@ class TapTest(NamedTuple):
         File and line.
     remarks : tuple of Remark
         What the file does not state and was assumed.
+    told : bool
+        Whether the file or the user says which quantity it is.
     """
 
     frequency: FloatArray
@@ -80,6 +69,7 @@ class TapTest(NamedTuple):
     point: str
     where: str
     remarks: tuple[Remark, ...] = ()
+    told: bool = True
 
 
 class Source(NamedTuple):
@@ -92,15 +82,18 @@ class Source(NamedTuple):
         Axes of response and force; None takes what the file names.
     record : int or None
         Number in the file, from 1.
+    correction : Correction
+        Of what the file holds.
     """
 
     path: Path
     pair: tuple[str, str] | None = None
     record: int | None = None
+    correction: Correction = Correction.AUTO
 
 
 def read_tap_tests(sources: Sequence[Source], units: str | None = None, from_hz: float = 0.0) -> dict[tuple[str, str], MeasuredCurve]:
-    """Return the tip's FRFs for each pair of axes (response, force).
+    """Return the tip's FRFs for each pair of axes (response, force); those that no tip can have are turned or remarked.
 
     Parameters
     ----------
@@ -123,8 +116,14 @@ def read_tap_tests(sources: Sequence[Source], units: str | None = None, from_hz:
             kept = test.frequency >= from_hz
             if np.count_nonzero(kept) < 2:
                 raise InputError("frf_from_hz", f"{from_hz:g}", f"a frequency below the last, {test.frequency[-1]:g} Hz", test.where)
-            said = (remark.of(f"FRF {pair_name(pair)}") for remark in test.remarks)
-            found[pair] = MeasuredCurve(test.frequency[kept], test.values[kept], said)
+            values, judgement = judged(test.frequency[kept], test.values[kept], source.correction, pair[0] == pair[1], test.told)
+            said = (remark.of(f"FRF {pair_name(pair)}") for remark in (*test.remarks, *judgement))
+            found[pair] = MeasuredCurve(test.frequency[kept], values, said)
+    for pair, curve in found.items():
+        other = found.get((pair[1], pair[0]))
+        if pair[0] < pair[1] and other is not None and np.array_equal(curve[0], other[0]):
+            differ = reciprocal(curve[0], curve[1], other[1], (pair_name(pair), pair_name((pair[1], pair[0]))))
+            found[pair] = MeasuredCurve(*curve, (*curve.remarks, *differ))
     return found
 
 
@@ -142,49 +141,54 @@ def pair_name(pair: tuple[str, str]) -> str:
 
 def read_frfs(path: str | Path, units: str | None = None) -> list[TapTest]:
     """Return all FRFs of a file as receptances, whichever of the formats it has; its content decides, not its suffix."""
-    scale = None if units is None else parse_units(units, "frf_units")
-    head = read_bytes(path, "FRF", _LARGEST)[:20000]
+    unit = None if units is None else parse_units(units, "frf_units")
+    raw = read_bytes(path, "FRF", _LARGEST)
+    head = raw[:20000]
     first = next((line.strip() for line in head.splitlines() if line.strip()), b"")
     if first == b"-1":
-        return _from_uff(path, scale)
-    if FREQUENCY.encode() in head:
-        if units is not None and scale != (1.0, 0):
+        return _from_uff(path, unit)
+    if any(f"{axis}_{part}".encode() in head for axis in AXES for part in ("re", "im")) and FREQUENCY.encode() in head:
+        if unit not in (None, FrfUnit(1.0, 0)):
             raise InputError("frf_units", units, "m/N, or no unit, for an FRF.csv", str(path))
         return _from_csv(path)
-    return _from_columns(path, scale)
+    # most tips come without a text, and its grammar takes as long to compile as to read one
+    from rcsa_ident.io.frf_text import read_frf_text
+
+    found = []
+    for record, (frequency, values, own, axis, told, said) in enumerate(read_frf_text(raw, unit, str(path)), start=1):
+        frequency, values = _receptance(frequency, values, own, str(path))
+        found.append(TapTest(frequency, values, axis[:1], axis[-1:], record, "", str(path), said, told))
+    return found
 
 
-def parse_units(text: str, field: str = "unit", where: str = "") -> tuple[float, int]:
-    """Return SI units per unit and the number of time derivatives of a motion over a force.
+def parse_units(text: str, field: str = "unit", where: str = "") -> FrfUnit:
+    """Return the unit of an FRF, such as ``(m/s^2)/N``, ``mm/N`` or ``N/m``.
 
     Parameters
     ----------
     text : str
-        A motion over a force, such as ``(m/s^2)/N`` or ``mm/N``.
     field, where : str
         What the text is and where it stands, for the message.
     """
-    plain = _plain(text)
-    for place in (i for i, sign in enumerate(plain) if sign == "/"):
-        motion, force = MOTIONS.get(plain[:place]), FORCES.get(plain[place + 1 :])
-        if motion is not None and force is not None:
-            return motion[0] / force, motion[1]
-    raise InputError(field, text, UNITS_ALLOWED, where)
+    unit = frf_unit(text)
+    if unit is None:
+        raise InputError(field, text, UNITS_ALLOWED, where)
+    return unit
 
 
-def _plain(text: str) -> str:
-    plain = re.sub(r"[\s()\[\]^]|\*\*", "", text).replace("²", "2").replace("µ", "u").replace("μ", "u").lower()
-    return plain.replace("s*s", "s2").replace("sec", "s").replace("inch", "in")
-
-
-def _receptance(frequency: FloatArray, values: ComplexArray, scale: tuple[float, int], where: str) -> tuple[FloatArray, ComplexArray]:
-    """Receptance of a mobility or an accelerance; at 0 Hz those say nothing of it, so the line goes."""
+def _receptance(frequency: FloatArray, values: ComplexArray, unit: FrfUnit, where: str) -> tuple[FloatArray, ComplexArray]:
+    """Receptance of whatever an FRF is; at 0 Hz a mobility or an accelerance says nothing of it, so the line goes."""
     if np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0:
         raise InputError("frequencies", "frequencies that do not increase", "increasing frequencies of 0 or more [Hz]", where)
-    if not scale[1]:
-        return frequency, values * scale[0]
+    values = values * unit.factor
+    if unit.inverse:
+        if not np.all(values):
+            raise InputError("FRF", f"0 at {frequency[values == 0.0][0]:g} Hz, a force over a motion", "numbers other than 0", where)
+        values = 1.0 / values
+    if not unit.order:
+        return frequency, values
     kept = frequency > 0.0
-    return frequency[kept], values[kept] * scale[0] / (2j * np.pi * frequency[kept]) ** scale[1]
+    return frequency[kept], values[kept] / (2j * np.pi * frequency[kept]) ** unit.order
 
 
 def _wanted(tests: list[TapTest], source: Source) -> dict[tuple[str, str], TapTest]:
@@ -238,7 +242,7 @@ def _from_csv(path: str | Path) -> list[TapTest]:
     return found
 
 
-def _from_uff(path: str | Path, scale: tuple[float, int] | None) -> list[TapTest]:
+def _from_uff(path: str | Path, unit: FrfUnit | None) -> list[TapTest]:
     functions = read_uff(path)
     found = []
     for i, function in enumerate(functions, start=1):
@@ -247,9 +251,9 @@ def _from_uff(path: str | Path, scale: tuple[float, int] | None) -> list[TapTest
         if not np.iscomplexobj(function.values):
             raise InputError("dataset 58", "an FRF of real numbers", "complex numbers (data type 5 or 6)", function.where)
         sign = 1.0 if function.response[1] * function.reference[1] >= 0 else -1.0
-        own = scale if scale is not None else _scale_of(function)
-        said = _assumed_of(function, scale is not None)
-        frequency, values = _receptance(function.abscissa, sign * function.values, own, function.where)
+        own = unit if unit is not None else _unit_of(function)
+        said = _assumed_of(function, unit is not None)
+        frequency, values = _receptance(_frequency_of(function), sign * function.values, own, function.where)
         place = f"{function.response[0]} / {function.reference[0]}"
         found.append(TapTest(frequency, values, _axis(function.response), _axis(function.reference), i, place, function.where, said))
     if not found:
@@ -274,77 +278,34 @@ def _axis(place: tuple[int, int]) -> str:
     return "" if direction == 0 else "XYZ"[direction - 1] if direction <= 3 else "rotation"
 
 
-def _scale_of(function: UffFunction) -> tuple[float, int]:
+def _unit_of(function: UffFunction) -> FrfUnit:
     """Unit of an FRF as its header says: by the labels, else by the data types in the file's system of units."""
-    labels = [label for label in (function.ordinate.unit, function.denominator.unit) if label]
+    numerator, denominator = ("" if is_untold(axis.unit) else axis.unit for axis in (function.ordinate, function.denominator))
     # some write the whole unit beside the numerator
-    for text in ("/".join(labels), labels[0] if labels else ""):
-        try:
-            return parse_units(text)
-        except InputError:
-            continue
+    found = frf_unit(quotient(numerator, denominator) if numerator and denominator else numerator)
+    if found is None and numerator and denominator:
+        found = frf_unit(numerator)
+    if found is not None:
+        return found
     length, force = function.factors
     order = _KINDS.get(function.ordinate.kind)
-    motion = MOTIONS.get(_plain(function.ordinate.unit)) if function.ordinate.unit else None
-    if motion is None and not function.ordinate.unit and order is not None:
-        motion = 1.0 / length, order
-    newton = FORCES.get(_plain(function.denominator.unit)) if function.denominator.unit else None
-    if newton is None and not function.denominator.unit and function.denominator.kind in (EXCITATION_FORCE, REACTION_FORCE):
+    motion = motion_unit(numerator) if numerator else (1.0 / length, order) if order is not None else None
+    newton = force_unit(denominator) if denominator else None
+    if not denominator and function.denominator.kind in (EXCITATION_FORCE, REACTION_FORCE):
         newton = 1.0 / force
     if motion is None or newton is None:
-        types = f"data types {function.ordinate.kind} and {function.denominator.kind}, labels {' and '.join(labels) or 'none'}"
+        labels = " and ".join(label for label in (numerator, denominator) if label)
+        types = f"data types {function.ordinate.kind} and {function.denominator.kind}, labels {labels or 'none'}"
         raise InputError("frf_units", types, UNITS_ALLOWED, function.where)
-    return motion[0] / newton, motion[1]
+    return FrfUnit(motion[0] / newton, motion[1])
 
 
-def _from_columns(path: str | Path, scale: tuple[float, int] | None) -> list[TapTest]:
-    where = str(path)
-    raw = read_bytes(path, "FRF", _LARGEST)
-    if b"\0" in raw:
-        raise InputError("FRF", "binary data", "an FRF.csv, a universal file, or text columns frequency, real, imaginary", where)
-    text = raw.decode("utf-8-sig", errors="replace")
-    lines = text.splitlines()
-    comma = "," in text and "." not in text and any(sign in text for sign in "\t;")
-    split = re.compile(r"[\s;]+" if comma else r"[\s;,]+")
-    rows: list[list[float]] = []
-    names = ""
-    for number, line in enumerate(lines, start=1):
-        cells = split.split((line.replace(",", ".") if comma else line).strip())
-        if cells == [""]:
-            continue
-        values = [_as_float(cell) for cell in cells[:3]]
-        if len(values) == 3 and None not in values:
-            rows.append([v for v in values if v is not None])
-            names += "" if len(cells) == 3 or len(rows) > 1 else " ".join(cells[3:])
-        elif rows or number > _MOST_HEADER:
-            raise InputError("FRF", line.strip() or "nothing", "three numbers: frequency [Hz], real, imaginary", f"{where} line {number}")
-        else:
-            names += f" {line.strip()}"
-    if len(rows) < 2:
-        raise InputError("FRF", f"{len(rows)} lines of numbers", "two or more of frequency [Hz], real, imaginary", where)
-    table = np.array(rows)
-    if not np.all(np.isfinite(table)):
-        raise InputError("FRF", "numbers that are not finite", "finite numbers", where)
-    if table[-1, 0] < _LOWEST_END and len(rows) > table[-1, 0] - table[0, 0] > 0:
-        found = f"{len(rows)} lines up to {table[-1, 0]:g}"
-        raise InputError("FRF", f"{found}: samples over time?", "frequencies [Hz] of a machine; hits of a hammer are read by tap", where)
-    own = scale or _unit_in(names)
-    frequency, values_ = _receptance(table[:, 0], table[:, 1] + 1j * table[:, 2], own or (1.0, 0), where)
-    return [TapTest(frequency, values_, "", "", 1, "", where, () if own else (assumed("the table", "", "receptance [m/N]"),))]
-
-
-def _as_float(text: str) -> float | None:
-    try:
-        return None if "_" in text else float(text)
-    except ValueError:
-        return None
-
-
-def _unit_in(names: str) -> tuple[float, int] | None:
-    """The first unit of a motion over a force among the names of a text file, None without one."""
-    for word in re.split(r"[\s,;]+", names):
-        try:
-            return parse_units(word)
-        except InputError:
-            continue
-    return None
+def _frequency_of(function: UffFunction) -> FloatArray:
+    """Frequencies [Hz], in the unit of the abscissa's label."""
+    label = function.abscissa_axis.unit
+    if is_untold(label):
+        return function.abscissa
+    factor = hertz_in(label)
+    if factor is None:
+        raise InputError("unit of the abscissa", label, "Hz, kHz, rad/s or rpm", function.where)
+    return function.abscissa * factor

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import tomlkit
 from tomlkit.items import InlineTable, Table
 
+from rcsa_ident.dynamics.passivity import judged
 from rcsa_ident.dynamics.receptance import MeasuredCurve
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import read_bytes, write_text
@@ -82,7 +83,8 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
             continue
         if axis in found:
             raise InputError("FRF", f"two FRFs with response and force in {axis}", "one for each axis", str(path))
-        found[axis] = MeasuredCurve(test.frequency, test.values, (remark.of(path.name) for remark in test.remarks))
+        values, judgement = judged(test.frequency, test.values, unit_told=test.told)
+        found[axis] = MeasuredCurve(test.frequency, values, (remark.of(path.name) for remark in (*test.remarks, *judgement)))
     if not found:
         names = listed([f"{t.response or '?'}/{t.force or '?'}" for t in tests])
         raise InputError("FRF", names, "response/force X/X or Y/Y, or a single FRF in a file whose name ends in x or y", str(path))
@@ -155,4 +157,6 @@ def read_hammer_test(test: HammerTest) -> MeasuredCurve:
     if len(found) != 1:
         told = "no such record" if not found else f"{len(found)} FRFs"
         raise InputError("record", told, "the number of one FRF of the file", str(test.file))
-    return MeasuredCurve(found[0].frequency, found[0].values, (remark.of(test.id) for remark in found[0].remarks))
+    (frf,) = found
+    values, judgement = judged(frf.frequency, frf.values, test.correction, test.response == test.force, frf.told, test.band)
+    return MeasuredCurve(frf.frequency, values, (remark.of(test.id) for remark in (*frf.remarks, *judgement)))

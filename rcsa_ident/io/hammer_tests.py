@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import HammerTest, Tooling
 
@@ -25,6 +26,7 @@ HAMMER_TEST_KEYS = (
     "from_hz",
     "to_hz",
     "error_percent",
+    "correction",
 )
 _POINTS = ("tip", "flange")
 
@@ -70,6 +72,7 @@ def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callab
         table.number("sensor_mass_g", "g", 0.0, least=0.0, most=1000.0) * 1e-3,
         (low, np.inf if high is None else high),
         table.number("error_percent", "%", 2.0, least=0.0, most=100.0) * 1e-2,
+        Correction(table.text("correction", "auto", choices=tuple(Correction))),
     )
 
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, StoredChannel, the_only
+from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, Bytes, existing_file, mapped, replacing
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.signals.recording import LONGEST
@@ -95,10 +95,11 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
             datasets = [_dataset(file, name, present, where) for name in names]
             _check_size(datasets, names, size, where)
             rate = _rate(file, datasets, names, default_rate, where)
-            return rate, [
+            channels = [
                 StoredChannel(dataset.size, partial(_part, path, name)) if dataset.size > LONGEST else dataset[()]
                 for name, dataset in zip(names, datasets, strict=True)
             ]
+            return rate, Signals(channels, stored=tuple(_unit(dataset) for dataset in datasets))
     except InputError:
         raise
     except _BROKEN as error:

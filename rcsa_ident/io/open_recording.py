@@ -10,9 +10,10 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import RATE, notes_of
 from rcsa_ident.io.recordings import READERS, SOUND, read_signals
 from rcsa_ident.io.text_header import name_and_unit
-from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, known_unit, of_unit, told_table
+from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, known_unit, told_table
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.told_units import quantity_in
 from rcsa_ident.signals.verdict import RecordCode
 
 #: Tables of text.
@@ -59,7 +60,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
     told: dict[str, str] = dict(import_module(f"rcsa_ident.io.{_LISTING[suffix]}").told_channels(path))
     units = {name: name_and_unit(name, known_unit)[1] or unit for name, unit in told.items()}
     # beside channels of known units there may be others of another length or rate
-    wanted = list(names) or [name for name, unit in units.items() if of_unit(unit)[1] is not None] or list(units)
+    wanted = list(names) or [name for name, unit in units.items() if quantity_in(unit)[1] is not None] or list(units)
     if not wanted:
         raise InputError("channel", "none", "names of channels: the file has no vectors of numbers at its top", str(path))
     try:
@@ -70,7 +71,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
         raise
     channels = []
     for name, signal in zip(wanted, signals, strict=True):
-        factor, quantity = of_unit(units.get(name, ""))
+        factor, quantity = quantity_in(units.get(name, ""))
         channels.append(OpenChannel(name, units.get(name, ""), quantity, factor * signal[:]))
     return OpenRecording(rate, tuple(channels))
 

@@ -11,10 +11,11 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import LARGEST_DATA, VOLTAGES, Channel, Signals, StoredChannel, notes_of
+from rcsa_ident.io.channels import LARGEST_DATA, Channel, Signals, StoredChannel, notes_of
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.signals.told_units import is_untold, quantity_in, volts_in
 
 Reader = Callable[..., tuple[float, Sequence[Channel]]]
 
@@ -163,6 +164,7 @@ class StoredSamples:
 def recorded(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> Recording:
     """Return signals in SI as `in_si`, but leave those of a long recording where they are."""
     if any(isinstance(signal, StoredChannel) for signal in signals):
+        _check_units(signals, sensors)
         return Recording(rate, cast(FloatArray, StoredSamples(rate, signals, sensors)), sensors, notes_of(signals))
     return in_si(rate, signals, sensors)
 
@@ -177,8 +179,7 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
         As they stand in the file.
     sensors : tuple of Sensor
     """
-    if isinstance(signals, Signals) and signals.units:
-        _check_units(signals.units, sensors)
+    _check_units(signals, sensors)
     size = 8 * signals[0].size * len(sensors)
     if size > LARGEST_DATA:
         found = f"{size / MEGABYTE:.3g} MB of samples"
@@ -194,19 +195,25 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
     return Recording(rate, samples, sensors, notes_of(signals))
 
 
-def _check_units(units: Sequence[tuple[str, Quantity | None]], sensors: Sequence[Sensor]) -> None:
-    """Refuse sensors that contradict the units which their file says itself."""
-    for sensor, (unit, quantity) in zip(sensors, units, strict=True):
-        if sensor.quantity is Quantity.TRIGGER:
+def _check_units(signals: Sequence[Channel], sensors: Sequence[Sensor]) -> None:
+    """Refuse sensors that contradict the units which their file says itself, and units that no sensitivity turns into SI."""
+    if not isinstance(signals, Signals):
+        return
+    told = [(unit, quantity, 1.0) for unit, quantity in signals.units]
+    told += [(unit, quantity, factor) for unit in signals.stored for factor, quantity in (quantity_in(unit),)]
+    for sensor, (unit, quantity, factor) in zip(sensors, told, strict=False):
+        if sensor.quantity is Quantity.TRIGGER or is_untold(unit):
             continue
-        if quantity is not None and quantity is not sensor.quantity:
+        field = f"sensors.{sensor.name}.sensitivity"
+        if quantity not in (None, sensor.quantity):
             raise InputError(f"sensors.{sensor.name}.quantity", str(sensor.quantity), f"{quantity}: the file's unit is {unit}")
-        if quantity is not None and sensor.sensitivity != 1.0:
-            allowed = f"1.0: the file says {unit}, and its samples are turned into SI"
-            raise InputError(f"sensors.{sensor.name}.sensitivity", sensor.sensitivity, allowed)
-        if unit in VOLTAGES and sensor.sensitivity == 1.0:
-            allowed = f"the sensor's sensitivity [V per SI unit]: the file is in {unit}"
-            raise InputError(f"sensors.{sensor.name}.sensitivity", sensor.sensitivity, allowed)
+        if signals.units and quantity is not None and sensor.sensitivity != 1.0:
+            raise InputError(field, sensor.sensitivity, f"1.0: the file says {unit}, and its samples are turned into SI")
+        if quantity is None and sensor.sensitivity == 1.0:
+            signal = "V" if signals.units and volts_in(unit) is not None else unit
+            raise InputError(field, sensor.sensitivity, f"the sensor's sensitivity [{signal} per SI unit]: the file is in {unit}")
+        if factor != 1.0 and sensor.sensitivity == 1.0:
+            raise InputError(field, sensor.sensitivity, f"{1.0 / factor:.6g} [{unit} per SI unit]: the file is in {unit}")
 
 
 def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) -> tuple[Recording, Recording | None]:

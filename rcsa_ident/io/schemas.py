@@ -144,6 +144,7 @@ _CAMPAIGNS = (
                 "from_hz": 200.0,
                 "to_hz": 4000.0,
                 "error_percent": 3.0,
+                "correction": "reverse",
             },
         ],
     },

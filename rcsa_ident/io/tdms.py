@@ -22,6 +22,7 @@ from rcsa_ident.io.channels import (
     RATE,
     Channel,
     Scratch,
+    Signals,
     cannot_be_read,
     check_declared,
     check_lengths,
@@ -74,9 +75,13 @@ def told_channels(path: Path) -> list[tuple[str, str]]:
     """Return the names of a file's channels that hold numbers, each with its unit, empty where the file says none."""
     with _opened(path) as (file, _):
         present = [channel for group in file.groups() for channel in group.channels()]
-        units = [str(next((c.properties[key] for key in _UNITS if key in c.properties), "")) for c in present]
+        units = [_unit(channel) for channel in present]
         held = [len(c) > 1 and c.dtype.kind in "iuf" for c in present]
         return [pair for pair, numbers in zip(zip(_plain_names(present), units, strict=True), held, strict=True) if numbers]
+
+
+def _unit(channel: Any) -> str:
+    return str(next((channel.properties[key] for key in _UNITS if key in channel.properties), ""))
 
 
 def _plain_names(present: Sequence[Any]) -> list[str]:
@@ -211,7 +216,8 @@ def _channels(file: Any, names: Sequence[str], default: float | None, size: int,
     rate = _rate(found, names, default, where)
     if file.file_status.incomplete_final_segment or file.file_status.channel_statuses:
         raise InputError("recording", "a last segment that is not complete", COMPLETE, where)
-    return rate, [_values(channel, f"channel {name}", where) for name, channel in zip(names, found, strict=True)]
+    channels = [_values(channel, f"channel {name}", where) for name, channel in zip(names, found, strict=True)]
+    return rate, Signals(channels, stored=tuple(_unit(channel) for channel in found))
 
 
 def _values(channel: Any, field: str, where: str) -> Channel:

@@ -76,9 +76,10 @@ def _chatter(table: TextTable) -> FloatArray:
     return found
 
 
-def unused_columns(path: str | Path) -> tuple[str, ...]:
-    """Return the columns of a table of tested cuts that nobody reads."""
-    return tuple(name for name in read_table(path, "tested cuts").header if name not in (*COLUMNS, CHATTER))
+def left_aside(path: str | Path) -> list[str]:
+    """Return a sentence on each column of a table of tested cuts that nobody reads."""
+    header = read_table(path, "tested cuts").header
+    return [f"{path}: the column {name} is left aside" for name in header if name not in (*COLUMNS, CHATTER)]
 
 
 def write_tests(path: str | Path, cuts: TestedCuts, probability: FloatArray) -> None:

@@ -12,9 +12,8 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import text_columns
-from rcsa_ident.io.channels import VOLTAGES, Channel, Signals, StoredChannel, the_only
+from rcsa_ident.io.channels import Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
-from rcsa_ident.io.frf_files import FORCES, MOTIONS
 from rcsa_ident.io.text_columns import LARGEST_TEXT, Meant, decoded
 from rcsa_ident.io.text_header import Head, columns_of, read_head, split, tells_rate, times_of
 from rcsa_ident.io.text_rows import STAMP, beside, first_numbers, lines_of, numbers_of, rows_of
@@ -22,9 +21,9 @@ from rcsa_ident.io.time_base import UNITS_OF_TIME, Irregular, seconds_per, time_
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
+from rcsa_ident.signals.told_units import is_untold, quantity_in, told_unit
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
-_DERIVATIVES = {0: Quantity.DISPLACEMENT, 2: Quantity.ACCELERATION}
 #: Units of times without a unit, which the rate decides; and as a share, rates that agree.
 _UNITLESS = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 _ALIKE = 0.01
@@ -99,7 +98,12 @@ class OpenRecording:
         if not kept:
             found = listed([f"{each.name} [{each.unit}]" for each in chosen])
             raise InputError("quantity", found, f"a channel that measures {quantity}")
-        units = tuple(assumed(each.name, each.unit, f"{quantity} [{SI_UNITS[quantity]}]") for each in kept if each.quantity is None)
+        # lines stay where they are in any unit, amplitudes do not
+        units = tuple(
+            assumed(each.name, each.unit, f"{quantity} [{SI_UNITS[quantity]}]" if is_untold(each.unit) else f"{quantity}, in that unit,")
+            for each in kept
+            if each.quantity is None
+        )
         return quantity, kept, (*self.remarks, *units)
 
 
@@ -137,7 +141,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         return Meant(tuple(header[i] for i in times), seconds[0] if seconds else 1.0, tuple(header[i] for i in places))
 
     rate, signals = text_columns.read_channels(path, meant, default_rate)
-    scales = [of_unit(unit) for unit in units]
+    scales = [quantity_in(unit) for unit in units]
     scaled = [_scaled(signal, factor) for signal, (factor, _) in zip(signals, scales, strict=True)]
     return rate, Signals(scaled, tuple(notes), tuple((unit, quantity) for unit, (_, quantity) in zip(units, scales, strict=True)))
 
@@ -246,7 +250,7 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
         elif i in (*time, *stamped, *head.times) and i not in called:
             continue
         elif i in called or np.ptp(np.nan_to_num(values[:, i])) > 0.0:
-            factor, quantity = of_unit(unit)
+            factor, quantity = quantity_in(unit)
             channels.append(OpenChannel(called.get(i, name), unit, quantity, np.ascontiguousarray(values[:, i] * factor)))
     if not channels:
         raise InputError("recording", f"columns {listed(head.names)}", "a column of numbers that move beside the time", where)
@@ -319,17 +323,5 @@ def _nearly_even(time: FloatArray) -> float | None:
 
 
 def known_unit(text: str) -> bool:
-    """Return whether a text is a unit of something that is measured, or of a voltage."""
-    return of_unit(text)[1] is not None or text in VOLTAGES
-
-
-def of_unit(unit: str) -> tuple[float, Quantity | None]:
-    """Return SI units per unit and what it measures; (1, None) where it says nothing that is known."""
-    plain = unit.strip().lower().replace(" ", "").replace("²", "2").replace("^", "").replace("**", "").replace("µ", "u").replace("μ", "u")
-    if plain in MOTIONS and MOTIONS[plain][1] in _DERIVATIVES:
-        return MOTIONS[plain][0], _DERIVATIVES[MOTIONS[plain][1]]
-    if plain in FORCES:
-        return FORCES[plain], Quantity.FORCE
-    if unit.strip() in VOLTAGES:
-        return VOLTAGES[unit.strip()], None
-    return 1.0, None
+    """Return whether a text is a unit; a number is none."""
+    return told_unit(text) is not None and any(letter.isalpha() for letter in text)

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import RATE, check_lengths, snapped
+from rcsa_ident.io.channels import RATE, Channel, Signals, check_lengths, snapped
 from rcsa_ident.io.files import MEGABYTE, existing_file
 from rcsa_ident.io.time_base import JITTER, Irregular, uniform
 from rcsa_ident.io.uff import KINDS, UffFunction, read_uff
@@ -26,7 +25,7 @@ _DIGITS = 6
 _SPREAD = 0.5001 * 10.0 ** (1 - _DIGITS)
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
     """Return the sampling rate [Hz] and the named channels in the file's own units, shape (n,) each.
 
     A channel is called by its response entity, the label of its ordinate, its title or its place (``3:-X``). The header keeps six
@@ -53,7 +52,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         # a start of six digits may be rounded by more than a sample
         if abs(apart) * rates[0] > 0.5 + _SPREAD * abs(each.abscissa[0]) * rates[0] * 2.0:
             raise InputError(f"start of channel {name}", f"{apart:.3g} s later", f"channels that start together as {names[0]}", each.where)
-    return rates[0], [f.values for f in found]
+    return rates[0], Signals([f.values for f in found], stored=tuple(f.ordinate.unit for f in found))
 
 
 def told_channels(path: Path) -> list[tuple[str, str]]:

@@ -66,7 +66,7 @@ class RecordCode(RemarkCode):
 
 
 def assumed(what: str, unit: str, meant: str) -> Remark:
-    """Return the remark on a unit that a file does not state, or states as one that is unknown.
+    """Return the remark on a unit that a file does not state, or states as one that does not say what is measured.
 
     Parameters
     ----------

@@ -9,12 +9,15 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.dynamics.passivity import Correction, judged
+from rcsa_ident.errors import InputError, positive
 from rcsa_ident.plausibility import RATE, SENSOR_MASS
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.tap import HitEstimator, TapFrf, tap
+from rcsa_ident.signals.told_units import force_unit, is_untold, motion_unit, volts_in
 from rcsa_ident.signals.verdict import RecordCode, assumed
+from rcsa_ident.units import to_hz
 
 #: How many times as long as the hammer's pulses the other channels go on.
 _LONGER = 3.0
@@ -23,7 +26,6 @@ _SAME_RATE = 1e-4
 #: How often a response is differentiated, by the words of commands and queries, and by what a channel's unit says.
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _UNITS = ("m", "m/s", "m/s²")
-_OF_UNIT = {Quantity.DISPLACEMENT: 0, Quantity.ACCELERATION: 2}
 
 
 class Channel(Protocol):
@@ -58,6 +60,9 @@ def tap_recordings(
     estimator: HitEstimator = HitEstimator.H1,
     sensor_mass: float = 0.0,
     axis: str = "X",
+    force_sensitivity: float | None = None,
+    response_sensitivity: float | None = None,
+    reverse: bool = False,
 ) -> TapFrf:
     """Return the receptance that recordings of hits give together; its remarks say what was assumed.
 
@@ -73,6 +78,10 @@ def tap_recordings(
         As of `rcsa_ident.signals.tap.tap`.
     axis : str
         Machine axis of hammer and response, X or Y.
+    force_sensitivity, response_sensitivity : float or None
+        Signal per newton and per SI unit of the response, of channels in volts or in a unit that is not known.
+    reverse : bool
+        The sensor or the hammer is reversed: the receptance is turned.
 
     Raises
     ------
@@ -85,16 +94,21 @@ def tap_recordings(
     derivative, pairs, said = DERIVATIVES[quantity], [], list[Remark]()
     for recording in recordings:
         hammer, moved, remarks = _pair(recording, force, response)
-        pairs.append((hammer.samples, moved.samples))
-        derivative = derivative if moved.quantity is None else _OF_UNIT.get(moved.quantity, derivative)
-        if moved.quantity not in _OF_UNIT:
-            remarks.append(assumed(moved.name, moved.unit, f"{quantity} [{_UNITS[DERIVATIVES[quantity]]}]"))
-        said += [remark for remark in (*recording.remarks, *remarks) if remark not in said]
+        newton, taken = _in_si(hammer, "force", force_sensitivity, f"force [{SI_UNITS[Quantity.FORCE]}]")
+        motion, assumed_ = _in_si(moved, "response", response_sensitivity, f"{quantity} [{_UNITS[DERIVATIVES[quantity]]}]")
+        pairs.append((newton, motion))
+        told = motion_unit(moved.unit)
+        derivative = DERIVATIVES[quantity] if told is None else told[1]
+        said += [remark for remark in (*recording.remarks, *remarks, *taken, *assumed_) if remark not in said]
     rates = sorted(recording.rate for recording in recordings)
     if not rates or rates[-1] > (1.0 + _SAME_RATE) * rates[0]:
         raise InputError("sampling_rate_hz", ", ".join(f"{rate:g}" for rate in rates) or "no recording", "one rate for all recordings [Hz]")
     said += [each for each in (RATE.remark("sampling_rate_hz", RATE.checked("sampling_rate_hz", rates[0])),) if each is not None]
-    return replace(tap(rates[0], pairs, derivative, estimator, sensor_mass), axis=axis, remarks=tuple(said))
+    found = tap(rates[0], pairs, derivative, estimator, sensor_mass)
+    # where hammer and sensor were at two points, nobody knows the sign: it is turned where that was asked
+    turn = Correction.REVERSE if reverse else Correction.NONE
+    values, judgement = judged(to_hz(found.omega), found.receptance, turn)
+    return replace(found, receptance=values, axis=axis, remarks=(*said, *judgement))
 
 
 def _pair(recording: Opened, force: str | None, response: str | None) -> tuple[Channel, Channel, list[Remark]]:
@@ -108,12 +122,27 @@ def _pair(recording: Opened, force: str | None, response: str | None) -> tuple[C
     else:
         hammer = hammer_channel([each.samples for each in channels])
         said.append(Remark(RecordCode.ASSUMED, f"{channels[hammer].name}, which comes in pulses, was taken as the hammer's force"))
-    if channels[hammer].quantity is not Quantity.FORCE:
-        said.append(assumed(channels[hammer].name, channels[hammer].unit, f"force [{SI_UNITS[Quantity.FORCE]}]"))
     others = [i for i in range(len(channels)) if i != hammer]
     if response is None and len(others) != 1:
         raise InputError("response", ", ".join(channels[i].name for i in others) or "none", "the name of one channel")
     return channels[hammer], channels[others[0] if response is None else _named("response", response, channels)], said
+
+
+def _in_si(channel: Channel, kind: str, sensitivity: float | None, meant: str) -> tuple[FloatArray, list[Remark]]:
+    """A channel's samples in SI, and what was assumed; a unit that says nothing of the force or the motion asks for the sensitivity."""
+    known = force_unit(channel.unit) if kind == "force" else motion_unit(channel.unit)
+    field = f"{kind}_sensitivity"
+    if known is not None:
+        if sensitivity is not None:
+            raise InputError(field, f"{sensitivity:g}", f"none: channel {channel.name} has the unit {channel.unit}")
+        return channel.samples, []
+    if sensitivity is not None:
+        return channel.samples / positive(field, sensitivity, "signal per SI unit"), []
+    if is_untold(channel.unit):
+        return channel.samples, [assumed(channel.name, "", meant)]
+    signal = "V" if volts_in(channel.unit) is not None else channel.unit
+    allowed = f"a unit of the {kind}, or {field} [{signal} per SI unit] told"
+    raise InputError(f"unit of channel {channel.name}", channel.unit, allowed)
 
 
 def _named(field: str, name: str, channels: Sequence[Channel]) -> int:

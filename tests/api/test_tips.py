@@ -57,6 +57,18 @@ def by_library(tmp_path, cut: CutSpec) -> ToolChange:
     return ToolChange(known, BareCutter("tip", cutter), cut, RPM, 0.01)
 
 
+def test_a_conjugated_frf_is_turned_and_said(client: Client, tip):
+    asked = {"speeds": SPEEDS, "cut": CUT}
+    (right,) = client.lobes({**tip, "cutter": CUTTER}, **asked).toolings
+    for turn, values in (("auto", np.conj(ALONG["X"])), ("reverse", -ALONG["X"])):
+        first = {"text": columns(values), "axes": "X", "correction": turn}
+        (found,) = client.lobes({"frf": [first, tip["frf"][1]], "cutter": CUTTER}, **asked).toolings
+        assert found.limit_depth_mm == pytest.approx(right.limit_depth_mm, rel=1e-9)
+        assert any("FRF X: Im > 0 at 900 Hz" in each for each in found.warnings) == (turn == "auto")
+    problem = refused(422, client.lobes, {"frf": [{"text": columns(ALONG["X"]), "correction": "backwards"}], "cutter": CUTTER}, **asked)
+    assert "correction" in problem.errors[0].field
+
+
 def test_lobes_and_advice_are_those_of_the_library(client: Client, tip, tmp_path):
     spec = CutSpec(coefficients={"tangential": 7e8, "radial_ratio": 0.3}, feed_per_tooth=1e-4)
     change = by_library(tmp_path, spec)
@@ -146,7 +158,7 @@ BROKEN = columns(ALONG["Y"]).replace("\n1000 ", "\n1000 x ")
         ({"frf": [{"text": columns(ALONG["Y"]), "axes": "YX"}]}, ["T1"], "tip.frf: tip receptances", "one flexible direction"),
         ({"frf": [{"text": columns(ALONG["Y"]), "axes": "Y", "record": 2}]}, ["T1"], "tip.frf[0]: frf", "counted from 1"),
         ({"frf": [{"text": columns(ALONG["Y"]), "axes": "N"}]}, ["T1"], "tip.frf.0.axes", "'X'"),
-        ({"units": "N/m"}, ["T1"], "tip.frf: frf_units", "motion over force"),
+        ({"units": "N m"}, ["T1"], "tip.frf: frf_units", "motion over force"),
         ({"from_hz": 5000.0}, ["T1"], "tip.frf[0]: frf_from_hz", "3999 Hz"),
     ],
 )

@@ -173,6 +173,7 @@ def test_process_options_reach_the_method(shop):
         (("--frf", "x.frf"), "--modes and --frf"),
         (("--frf-units", "um/N"), "given together with --frf"),
         (("--frf-from-hz", "50"), "given together with --frf"),
+        (("--frf-correction", "reverse"), "given together with --frf"),
         (("--feed-per-tooth-mm", 0), "--feed-per-tooth-mm"),
         (("--kac", 30), "--kac: found 30"),
         (("--stock", "block"), "--y-from-mm and --y-to-mm: found nothing"),
@@ -407,15 +408,21 @@ def test_cases_in_process_and_at_standstill(result_file, tmp_path):
     rows = [
         (s, share * d, v) for s, d in zip(known.speed[:4], known.limit[:4], strict=True) for share, v in ((0.9, "stable"), (1.1, "chatter"))
     ]
-    lines = "".join(f"{s},{d},{v}\n" for s, d, v in rows)
-    (folder / "CUTS.csv").write_text("spindle_speed_rpm,axial_depth_mm,verdict\n" + lines, encoding="utf-8")
+    lines = "".join(f"{s},{d},{v},Bo\n" for s, d, v in rows)
+    (folder / "CUTS.csv").write_text("spindle_speed_rpm,axial_depth_mm,verdict,operator\n" + lines, encoding="utf-8")
     run("export", result_file, "--to", "csv", "--tooling", folder / "T1.toml", "--out", tmp_path / "tip.csv", "--from-hz", 100)
     found = read_tap_tests([Source(tmp_path / "tip.csv")])
     write_frf_csv(folder / "idle.csv", found["X", "X"][0], {axis: 2.0 * values for (axis, _), (_, values) in found.items()})
     case = 'tooling = "T1.toml"\nradial_depth_mm = 8.4\nstrategy = "up"\ntests = "CUTS.csv"\n'
     (folder / "CASES.toml").write_text(f'[[cases]]\n{case}[[cases]]\nname = "idle, too"\n{case}idle = ["idle.csv"]\n', encoding="utf-8")
     common = ("cases", result_file, folder / "CASES.toml", *speeds, "--plot", tmp_path / "C.svg")
-    plain, both = answer_of(*common)["cases"]
+    answer = answer_of(*common)
+    plain, both = answer["cases"]
+    # nothing is dropped in silence
+    assert sum(warning.endswith("CUTS.csv: the column operator is left aside") for warning in answer["warnings"]) == 2
+    tested = ("--tests", folder / "CUTS.csv", "--immersion", 0.7, "--strategy", "up", "--no-bands")
+    answer = answer_of("lobes", result_file, folder / "T1.toml", *speeds, *tested, "--out", tmp_path / "L.csv")
+    assert sum("the column operator is left aside" in warning for warning in answer["warnings"]) == 1
     assert plain["tested"]["share_right"] == both["tested"]["share_right"] == 1.0
     assert "tested_idle" not in plain
     assert both["tested_idle"]["chatter_stable"] == 4

@@ -41,6 +41,58 @@ def test_an_frf_that_is_read_again(recorded, tmp_path, suffix):
     assert np.linalg.norm(test.values[inside] - true) < 5e-3 * np.linalg.norm(true)
 
 
+def told(path, force_unit, response_unit, force_factor=1.0, response_factor=1.0, derivative=2):
+    """Hits with units in the names: samples are the SI ones over the factors."""
+    force, response = hits(count=2, derivative=derivative)
+    table = np.stack([np.arange(force.size) / RATE, force / force_factor, response / response_factor], axis=1)
+    np.savetxt(path, table, delimiter=",", header=f"time (s),hammer ({force_unit}),tip ({response_unit})", comments="", fmt="%.9e")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("units", "factors", "derivative", "options"),
+    [
+        (("N", "mg"), (1.0, 9.80665e-3), 2, ()),
+        (("kgf", "ft/s²"), (9.80665, 0.3048), 2, ()),
+        (("mN", "mm/s/s"), (1e-3, 1e-3), 2, ()),
+        (("N", "mm/s"), (1.0, 1e-3), 1, ()),
+        (("lbf", "mil"), (4.4482216152605, 25.4e-6), 0, ()),
+        # 2.3 mV/N, 10.2 mV per m/s²
+        (("mV", "mV"), (1e-3 / 2.3e-3, 1e-3 / 10.2e-3), 2, ("--force-sensitivity", "2.3e-3", "--response-sensitivity", "0.0102")),
+        (("counts", "m·s⁻²"), (0.5, 1.0), 2, ("--force-sensitivity", "2")),
+    ],
+)
+def test_units_that_the_file_says_count(tmp_path, units, factors, derivative, options):
+    path = told(tmp_path / "hits.csv", *units, *factors, derivative)
+    found = run("tap", path, "--out", tmp_path / "tip.csv", "--json", *options)
+    assert found.exit_code == 0, found.stderr
+    assert not any("is assumed" in remark for remark in json.loads(found.stdout)["remarks"])
+    (test,) = read_frfs(tmp_path / "tip.csv")
+    inside = (test.frequency > 300.0) & (test.frequency < 3000.0)
+    true = receptance(2.0 * np.pi * test.frequency[inside])
+    assert np.linalg.norm(test.values[inside] - true) < 5e-3 * np.linalg.norm(true)
+
+
+@pytest.mark.parametrize(
+    ("units", "options", "words"),
+    [
+        (("N", "furlong"), (), "unit of channel tip: found furlong, allowed is a unit of the response, or response_sensitivity"),
+        (("N", "mV"), (), "response_sensitivity [V per SI unit] told"),
+        (("V", "g"), (), "unit of channel hammer: found V, allowed is a unit of the force, or force_sensitivity [V per SI unit] told"),
+        (("Nm", "g"), (), "unit of channel hammer: found Nm"),
+        (("N", "Pa"), (), "unit of channel tip: found Pa"),
+        (("N", "g"), ("--response-sensitivity", "0.01"), "response_sensitivity: found 0.01, allowed is none: channel tip has the unit g"),
+        (("N", "V"), ("--response-sensitivity", "0"), "response_sensitivity: found 0"),
+    ],
+)
+def test_a_unit_that_says_nothing_of_it_is_never_si(tmp_path, units, options, words):
+    path = told(tmp_path / "hits.csv", *units)
+    found = run("tap", path, "--out", tmp_path / "tip.csv", *options)
+    assert found.exit_code == 2
+    assert words in " ".join(found.stderr.split())
+    assert not (tmp_path / "tip.csv").exists()
+
+
 def test_a_figure_and_words_for_people(recorded, tmp_path):
     found = run("tap", recorded, "--out", tmp_path / "tip.csv", "--plot", tmp_path / "tip.svg")
     assert found.exit_code == 0

@@ -57,6 +57,24 @@ def test_what_is_on_the_axis_becomes_a_receptance(tmp_path, axes, factor, order)
     np.testing.assert_allclose(found, X[kept], rtol=1e-10)
 
 
+@pytest.mark.parametrize(("label", "factor"), [("Hz", 1.0), ("NONE", 1.0), ("", 1.0), ("kHz", 1e-3), ("rad/s", 2.0 * np.pi), ("rpm", 60.0)])
+def test_the_label_of_the_abscissa_counts(tmp_path, label, factor):
+    path = tmp_path / "tip.uff"
+    function = UffFunction(
+        FRF, FREQUENCY * factor, X, (1, 1), (1, 1), UffAxis(18, label), UffAxis(DISPLACEMENT, "m"), UffAxis(EXCITATION_FORCE, "N")
+    )
+    write_uff(path, [function])
+    # the header has six digits of an even step
+    np.testing.assert_allclose(read_tap_tests([Source(path)])["X", "X"][0], FREQUENCY, rtol=1e-6)
+
+
+def test_an_abscissa_in_an_unknown_unit_is_refused(tmp_path):
+    path = tmp_path / "tip.uff"
+    write_uff(path, [UffFunction(FRF, FREQUENCY, X, (1, 1), (1, 1), UffAxis(18, "furlong"), UffAxis(DISPLACEMENT, "m"), UffAxis(13, "N"))])
+    with pytest.raises(InputError, match="unit of the abscissa: found furlong, allowed is Hz, kHz, rad/s or rpm"):
+        read_frfs(path)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
 def test_labels_beyond_ascii(tmp_path, encoding):
     path = tmp_path / "tip.uff"
@@ -91,13 +109,20 @@ def test_a_unit_that_nobody_knows_is_asked_for(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"), [("m/N", (1.0, 0)), ("um / N", (1e-6, 0)), ("(m/s^2)/N", (1.0, 2)), ("m/s**2/kN", (1e-3, 2))]
+    ("text", "expected"),
+    [
+        ("m/N", (1.0, 0, False)),
+        ("um / N", (1e-6, 0, False)),
+        ("(m/s^2)/N", (1.0, 2, False)),
+        ("m/s**2/kN", (1e-3, 2, False)),
+        ("N/m", (1.0, 0, True)),
+    ],
 )
 def test_units(text, expected):
     assert parse_units(text) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("text", ["", "m", "N/m", "m/", "/N", "kg/N", "m/s^3/N"])
+@pytest.mark.parametrize("text", ["", "m", "N", "m/", "/N", "kg/N", "m/s^3/N"])
 def test_units_that_are_none(text):
     with pytest.raises(InputError, match="motion over force"):
         parse_units(text)
@@ -108,7 +133,7 @@ def test_the_tip_is_hit_where_it_is_measured(tmp_path):
     records = [
         UffFunction(6, FREQUENCY, np.ones(FREQUENCY.size)),
         tip(XY, response=(7, 1), reference=(1, 1)),
-        tip(X, response=(1, 1), reference=(1, -1)),
+        tip(-X, response=(1, 1), reference=(1, -1)),
         tip(Y, response=(1, -2), reference=(1, -2)),
         tip(XY, response=(1, 1), reference=(1, 2)),
         tip(XY, response=(1, 3), reference=(1, 3)),
@@ -117,7 +142,8 @@ def test_the_tip_is_hit_where_it_is_measured(tmp_path):
     found = read_tap_tests([Source(path)])
     assert set(found) == {("X", "X"), ("Y", "Y"), ("X", "Y"), ("Z", "Z")}
     # a sensor that looks against the force
-    np.testing.assert_allclose(found["X", "X"][1], -X, rtol=1e-10)
+    np.testing.assert_allclose(found["X", "X"][1], X, rtol=1e-10)
+    assert found["X", "X"].remarks == ()
     np.testing.assert_allclose(found["Y", "Y"][1], Y, rtol=1e-10)
     chosen = read_tap_tests([Source(path, ("X", "X"), 2)])
     np.testing.assert_allclose(chosen["X", "X"][1], XY, rtol=1e-10)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.hammer import read_hammer_test
@@ -57,6 +60,26 @@ def test_all_keys(tmp_path):
     assert not test.standstill
     assert (test.band, test.error, test.record) == ((200.0, 300.0), 0.05, 1)
     assert test.sensor_mass == pytest.approx(0.004)
+    assert test.correction is Correction.AUTO
+
+
+def test_a_test_of_one_point_is_turned_where_that_is_certain_or_asked(tmp_path):
+    ratio = FREQUENCY / 250.0
+    h = 1.0 / (1e7 * (1.0 - ratio**2 + 0.1j * ratio))
+    path = folder(tmp_path, changed("force = 80.0", 'force = "tip"'))
+    np.savetxt(tmp_path / "turned.frf", np.stack([FREQUENCY, -h.real, -h.imag], axis=1), header="f[Hz] Re[m/N] Im[m/N]", comments="")
+    (test,) = read_campaign(path).tests
+    test = replace(test, file=tmp_path / "turned.frf")
+    found = read_hammer_test(test)
+    np.testing.assert_allclose(found[1], h, rtol=1e-9)
+    assert "a reversed sensor or hammer explains it" in found.remarks[0]
+    # of two points the sign is not known
+    elsewhere = replace(test, force=0.08)
+    assert read_hammer_test(elsewhere).remarks == ()
+    np.testing.assert_allclose(read_hammer_test(elsewhere)[1], -h, rtol=1e-9)
+    np.testing.assert_allclose(read_hammer_test(replace(elsewhere, correction=Correction.REVERSE))[1], h, rtol=1e-9)
+    (asked,) = read_campaign(folder(tmp_path, changed("force = 80.0", 'force = 80.0\ncorrection = "reverse"'))).tests
+    assert asked.correction is Correction.REVERSE
 
 
 @pytest.mark.parametrize(
@@ -70,6 +93,7 @@ def test_all_keys(tmp_path):
         ('file = "x.csv"', 'file = "z.csv"', r"frfs\[0\].file: found .*which does not exist"),
         ('file = "x.csv"', 'file = "x.csv"\nfrom_hz = 300\nto_hz = 200', r"frfs\[0\].to_hz"),
         ('file = "x.csv"', 'file = "x.csv"\nstandstil = true', "standstil"),
+        ('file = "x.csv"', 'file = "x.csv"\ncorrection = "backwards"', r"frfs\[0\].correction: found .*backwards"),
         ('id = "nut"', "id = 3", r"frfs\[0\].id"),
     ],
 )

@@ -1,5 +1,7 @@
 """Recordings of a campaign whose text tells itself: a preamble with the rate, names, and units in a line of their own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -132,3 +134,14 @@ def test_a_unit_that_nobody_knows_is_the_sensitivitys_business(tmp_path):
     (tmp_path / "cut.csv").write_text(table(unit="pC"))
     recording = read_recording(tmp_path / "cut.csv", with_sensitivity(2.0))
     np.testing.assert_allclose(recording.samples, 0.5 * FORCE[:, :2], rtol=1e-6, atol=1e-6)
+
+
+def test_a_campaign_never_takes_an_unknown_unit_as_si(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = "\n".join(f"{k / 1000},{k % 7}" for k in range(50))
+    path.write_text(f"lab 3\ntime,a\ns,furlong/s^2\n{rows}\n", encoding="utf-8")
+    sensor = Sensor("a", Quantity.ACCELERATION, Dof.X)
+    with pytest.raises(InputError, match=r"sensors.a.sensitivity: found 1.0, allowed is .*\[furlong/s\^2 per SI unit\]"):
+        read_recording(path, (sensor,))
+    found = read_recording(path, (replace(sensor, sensitivity=2.0),))
+    np.testing.assert_allclose(found.samples[:3, 0], [0.0, 0.5, 1.0])

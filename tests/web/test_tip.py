@@ -94,6 +94,18 @@ def test_hits_become_lobes_of_the_tooling_that_was_hit(opened, client: Client, t
     client.forget_tooling("Tapped")
 
 
+def test_a_conjugated_frf_is_said_and_its_correction_is_chosen(opened, measured: list[Path]):
+    measured[0].write_text(columns(ALONG["X"].conj()))
+    page = opened("#/tip")
+    told(page, measured)
+    said = page.get_by_text("FRF X: Im > 0 at 900 Hz").first
+    expect(said).to_contain_text("the FRF was turned (correction conjugate)", timeout=60_000)
+    page.get_by_label("Correction of tip_X.frf").select_option("none")
+    expect(said).to_contain_text("would explain it", timeout=60_000)
+    page.get_by_label("Correction of tip_X.frf").select_option("conjugate")
+    expect(said).to_have_count(0, timeout=60_000)
+
+
 def test_what_is_wrong_with_an_frf_is_told(opened, tmp_path: Path, measured: list[Path]):
     page = opened("#/tip")
     told(page, measured)

@@ -13,6 +13,15 @@ import { lobesBench } from "./lobes_bench.js";
 const WANTED = "The lobes appear here once cutter and material are told.";
 const DIRECTIONS = [["", "as the file says"], ...["X", "Y", "Z", "XY", "YX"].map((axes) => [axes, axes])];
 const UNITS = [["", "as the files say"], ...["m/N", "um/N", "mm/N", "in/lbf", "(m/s^2)/N", "g/N", "(m/s)/N"].map((unit) => [unit, unit.replace("um", "µm")])];
+const CORRECTIONS = [
+  ["", "what is certain"],
+  ["none", "nothing"],
+  ["reverse", "reversed sensor or hammer"],
+  ["conjugate", "time as e^(-iωt)"],
+  ["conjugate-reverse", "both of these"],
+  ["exchange", "exchanged columns"],
+  ["exchange-reverse", "exchanged and reversed"],
+];
 /** A cutter's own fields: key in the address, kind, key of a tooling file, label. */
 const CUTTER = [
   ["teeth", "none", "teeth", "Teeth"],
@@ -74,6 +83,15 @@ function measured(onchange, fault) {
     });
     return choice;
   };
+  const correctionOf = (frf) => {
+    const choice = select(CORRECTIONS, frf.correction ?? "", { "aria-label": `Correction of ${frf.name}` });
+    choice.addEventListener("change", () => {
+      frf.correction = choice.value;
+      changed(frfs);
+      onchange();
+    });
+    return choice;
+  };
   const away = (frf) =>
     h(
       "button",
@@ -92,6 +110,7 @@ function measured(onchange, fault) {
   const columns = [
     { name: "FRF", cell: (frf) => frf.name },
     { name: "Direction", cell: axesOf },
+    { name: "Put right", cell: correctionOf },
     { name: "Remove", cell: away },
   ];
   return card("Measured", null, table("FRFs of the tip", columns, frfs), h("p", { class: "small soft" }, "A direction without an FRF is rigid. XY is the motion along X under a force along Y."));
@@ -124,7 +143,7 @@ function cutterPicks(toolings, query) {
   const cutter = () => ({ teeth: value("teeth"), diameter_mm: value("dia"), ...(value("helix") === null ? {} : { helix_deg: value("helix") }) });
   const body = () => ({
     tip: {
-      frf: tapped().map(({ text, axes }) => ({ text, ...(axes ? { axes } : {}) })),
+      frf: tapped().map(({ text, axes, correction }) => ({ text, ...(axes ? { axes } : {}), ...(correction ? { correction } : {}) })),
       ...(units.value ? { units: units.value } : {}),
       ...(lowest.input.base === null ? {} : { from_hz: lowest.input.base }),
       ...(which.value ? {} : { cutter: cutter() }),
