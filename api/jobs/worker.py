@@ -25,7 +25,7 @@ from api.stores.jobs import Job, Jobs, Outcome, Worker
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.jobs")
-#: Intervals between two polls for new jobs, two heartbeats and two rounds of housekeeping, and time without a heartbeat after which a
+#: Intervals between two polls for new jobs, two heartbeats and two rounds of housekeeping, and time without a sign of life after which a
 #: worker counts as dead [s].
 LOOK, BEAT, ROUND, LEASE = 0.5, 4.0, 3.0, 20.0
 #: Carries out a job of one kind and returns its outcome, without the seconds.
@@ -116,7 +116,7 @@ class JobWorker:
         self.token, self.place = secrets.token_hex(12), place()
         self.id = ""
         self.submitted: set[str] = set()
-        self.seen: dict[str, tuple[int, float]] = {}
+        self.seen: dict[str, tuple[tuple[int, float], float]] = {}
 
     def run(self, ready: Callable[[], None], stop: threading.Event) -> None:
         """Work until `stop` is set; a running job continues elsewhere, or after the next start."""
@@ -201,13 +201,17 @@ class JobWorker:
         return True
 
     def _living(self) -> list[Worker]:
-        """Workers that appear alive; clocks differ between machines, so only changes of their heartbeats count."""
+        """Workers that appear alive; clocks differ between machines, so only changes of their heartbeats count.
+
+        One of this place that computes is alive, too: a long step leaves its heartbeat no time, least of all on a machine under load.
+        """
         now, found = time.monotonic(), []
         for row in self.jobs.workers():
-            beats, since = self.seen.get(row.token, (-1, now))
-            if beats != row.beats:
+            sign = (row.beats, spent(row.process) if row.place == self.place else 0.0)
+            before, since = self.seen.get(row.token, (sign, now))
+            if before != sign:
                 since = now
-            self.seen[row.token] = (row.beats, since)
+            self.seen[row.token] = (sign, since)
             if now - since <= LEASE and not (row.place == self.place and gone(row.process)):
                 found.append(row)
         return found
@@ -240,6 +244,15 @@ def _elsewhere(number: int) -> str:
         return f"{number}:{psutil.Process(number).create_time()}"
     except psutil.Error:
         return f"{number}:"
+
+
+def spent(identity: str) -> float:
+    """Return what a process of this place has used of processors [s], 0 where nobody knows."""
+    try:
+        used = psutil.Process(int(identity.partition(":")[0])).cpu_times()
+    except (psutil.Error, ValueError):
+        return 0.0
+    return float(used.user + used.system)
 
 
 def gone(identity: str) -> bool:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import subprocess
-import sys
 import threading
 import time
 from contextlib import suppress
@@ -20,7 +18,7 @@ from api.jobs import job_context as desks
 from api.jobs.backend import VERSION, Carried
 from api.jobs.codec import encode
 from api.jobs.job_context import JobContext
-from api.jobs.worker import LEASE, JobWorker, carry, gone, place, process
+from api.jobs.worker import LEASE, JobWorker, carry, process
 from api.security import new_id, now
 from api.stores.entities import Machine
 from api.stores.jobs import Outcome, Worker
@@ -435,23 +433,6 @@ def test_a_job_that_another_has_just_taken_over_is_left_to_it(store, machine):
     worker = worker_of(store, Carried(id, "running", "dead"))
     worker.reconcile()
     assert worker.backend.calls == []
-
-
-def test_a_dead_process_of_this_place_is_known_at_once():
-    me = process(os.getpid())
-    assert me == process(os.getpid())
-    assert not gone(me)
-    assert place() == place()
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
-        other = process(child.pid)
-        assert other != me
-        assert not gone(other)
-        child.kill()
-        child.wait()
-    if not other.endswith(":"):
-        assert gone(other)
-        # the same number, started at another time
-        assert gone(me.split(":")[0] + ":1")
 
 
 def test_workers_take_the_first_free_name(store):
