@@ -198,7 +198,7 @@ def test_a_machine_is_compensated_by_what_its_tip_gives_way(program, result_file
     [
         (("--forces", "1 2"), "--forces: found 1 2"),
         (("--forces", "1 2 x"), "--forces"),
-        (("--forces", "1 2 3", "--out", "OUT.txt"), ".nc"),
+        (("--forces", "1 2 3", "--out", "OUT.pdf"), ".nc"),
         (("--forces", "1 2 3", "--posture", "1 2"), "--posture"),
         (("--forces", "missing.csv"), "no such file"),
         (("--forces", "1 2 3", "--largest-mm", "0"), "--largest-mm"),

@@ -46,16 +46,16 @@ def client(served: Served) -> Iterator[Client]:
         yield found
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def launch() -> Iterator[Callable[..., Browser]]:
-    """Start browsers; for this room and no longer: the event loop runs in this thread, where other rooms' tests run loops of their own."""
+    """Start browsers; for a file and no longer: the event loop runs in this thread, where other rooms' tests run loops of their own."""
     # reached only where something is wrong, and long enough for a machine under load
     expect.set_options(timeout=30_000)
     with sync_playwright() as playwright:
         yield lambda *further: playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=[*QUIET, *further])
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def browser(launch: Callable[..., Browser]) -> Iterator[Browser]:
     found = launch()
     yield found
