@@ -127,9 +127,9 @@ def _tapped(raw: bytes, folder: Path) -> None:
 
     path = folder / "given.csv"
     path.write_bytes(raw)
-    asked = dict.fromkeys(("force", "response", "rate_hz"))
+    asked = dict.fromkeys(("force", "response", "rate_hz", "force_sensitivity", "response_sensitivity"))
     tap(
-        asked | {"quantity": "acceleration", "axis": "X", "estimator": "h1", "sensor_mass_g": 0.0, "file": ""},
+        asked | {"quantity": "acceleration", "axis": "X", "estimator": "h1", "sensor_mass_g": 0.0, "reverse": False, "file": ""},
         Upload(path, "given.csv", folder / "made"),
     )
 
