@@ -91,7 +91,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):
         lasted = json.loads(_DURATIONS.read_text()) if _DURATIONS.is_file() else {}
         weight: Counter[str] = Counter()
-        for name in {item.nodeid.partition("[")[0] for item in items}:
+        # in one order in all workers, who must agree to the last bit
+        for name in dict.fromkeys(item.nodeid.partition("[")[0] for item in items):
             file, _, function = name.partition("::")
             weight[_room(name)] += lasted.get(file, {}).get(function, 0.01)
         items.sort(key=lambda item: -weight[_room(item.nodeid)])
