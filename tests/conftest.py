@@ -85,9 +85,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         gate = {item for item in items if item.get_closest_marker("slow") is None or item.get_closest_marker("witness") is not None}
         changed = changed_since(since) if since else []
         paths = {path for path in {item.path for item in items} if not since or reached(changed, path)} if ring == "rest" else set()
-        kept = [item for item in items if (item in gate if ring == "gate" else item not in gate and item.path in paths)]
-        config.hook.pytest_deselected(items=[item for item in items if item not in set(kept)])
-        items[:] = kept
+        kept = gate if ring == "gate" else {item for item in items if item not in gate and item.path in paths}
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = [item for item in items if item in kept]
     if hasattr(config, "workerinput"):
         lasted = json.loads(_DURATIONS.read_text()) if _DURATIONS.is_file() else {}
         weight: Counter[str] = Counter()
