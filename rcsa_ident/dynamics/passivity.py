@@ -1,8 +1,8 @@
 """What a measured FRF must be, and what explains one that is not.
 
-A structure takes up the power of a force: where response and force are one point, Im h <= 0 at every frequency (time as e^{+iωt}), and as
-every causal FRF it turns clockwise through its resonances. A reversed sensor or hammer breaks the first, a conjugated FRF both, exchanged
-columns the second.
+A structure dissipates power: where response and force share a point and a direction, Im h <= 0 at every frequency (time as e^{+iωt}).
+Its FRFs, cross FRFs included, are circles that run clockwise through each resonance in the complex plane [ewins2000]. A reversed sensor or
+hammer violates the first, a conjugated FRF both, exchanged columns the second.
 """
 
 from __future__ import annotations
@@ -197,6 +197,7 @@ def _seen(frequency: FloatArray, values: ComplexArray, band: tuple[float, float]
     if frequency.size < _FEWEST or not np.any(values):
         return None
     power = frequency * values
+    # third differences leave no smooth curve, and 20 times the variance of white noise; its modulus is Rayleigh's, median sqrt(2 ln 2)
     differences = np.abs(np.diff(power, 3)) / np.sqrt(40.0 * np.log(2.0))
     half = min(_WINDOW, differences.size) // 2
     padded = np.pad(differences, (half, half), mode="reflect") if half else differences

@@ -255,11 +255,6 @@ def force_unit(text: str) -> float | None:
     return _of(text, _FORCE)
 
 
-def seconds_in(text: str) -> float | None:
-    """Return seconds per unit of a time."""
-    return _of(text, _SECOND)
-
-
 def hertz_in(text: str) -> float | None:
     """Return hertz per unit of a frequency or an angular frequency; 1/s could be either and is neither."""
     hertz, angular = _of(text, _FREQUENCY), _of(text, _ANGULAR)

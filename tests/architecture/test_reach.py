@@ -59,8 +59,13 @@ def test_kernels_are_kept_by_their_text(tmp_path, monkeypatch):
     assert (second / "_own_kernels.f-1.py311.1.nbc").read_bytes() == b"code"
     assert len({(room / "_own_kernels.py").stat().st_mtime for room in rooms}) == 1
     (rooms[1] / "_own_kernels.py").write_text("x = 2\n")
+    (second / "_own_kernels.f-1.py311.2.nbc").write_bytes(b"code of the text before")
+    kept_kernels.keep(rooms[1].parent)
     assert not kept_kernels.restore(rooms[1].parent)
     assert list(second.glob("*.nb[ci]")) == []
     assert kept_kernels.restore(rooms[0].parent)
+    # a cache folder that cannot be written keeps nothing
+    monkeypatch.setattr(kept_kernels, "KEPT", rooms[0] / "_own_kernels.py" / "kept")
+    kept_kernels.keep(rooms[0].parent)
     monkeypatch.setenv("NUMBA_CPU_NAME", "another")
     assert not kept_kernels.restore(rooms[0].parent)

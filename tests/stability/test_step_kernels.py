@@ -58,3 +58,42 @@ def test_elements_of_nearly_equal_steps_share_what_was_computed():
         for each, own in zip(found, alone, strict=True):
             np.testing.assert_array_equal(each[e :: places.shape[0]], own)
             assert np.any(own)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 6])
+@pytest.mark.parametrize("modes", [3, 8])
+def test_rows_are_what_the_responses_say(degree, modes):
+    """Of two elements and one in which nothing cuts; lengths of rows leave no remainder, and what fills them up is nothing."""
+    rng = np.random.default_rng(7)
+    pole = -100.0 * rng.uniform(0.5, 2.0, modes) + 1j * rng.uniform(2e3, 2e4, modes)
+    outputs, inputs = (rng.standard_normal(s) + 1j * rng.standard_normal(s) for s in ((2, modes), (modes, 2)))
+    arrays, table = ModeArrays(pole, outputs, inputs, rng.standard_normal((2, 2))), lobatto(degree)
+    places = np.array([[0.0, 3e-4, 2.0, 0.0, 0.0], [6e-4, 2e-4, 1.0, -1.0, 0.0], [8e-4, 1e-4, 1.0, 20.0, 0.0]])
+    decay, _, same, free, moved, driven = kernels.steps(arrays, places, table)
+    np.testing.assert_array_equal(same, [0, 1, 2])
+    np.testing.assert_allclose(decay[1, degree], np.exp(2e-4 * pole), rtol=1e-12)
+    q, r, pairs = degree, 2, driven.shape[2] // 2
+    assert (free.shape[0], moved.shape[0], driven.shape[0]) == (6, 3, 3)
+    assert [rows.shape[1] % 4 for rows in (free, moved, driven)] == [0, 0, 0]
+    assert (free.shape[2] % 16, moved.shape[2] % 16, pairs % 8) == (0, 0, 0)
+    assert (free.shape[1] - 2 * pairs - r < 4, moved.shape[1] - q * r < 4, driven.shape[1] - (q + 1) * r < 4) == (True, True, True)
+    assert (pairs - modes < 8, free.shape[2] - q * r < 16) == (True, True)
+    for e in (0, 2):
+        own = [np.empty(s, dtype=complex) for s in ((q + 1, modes), (q + 1, modes, r), (2, q, r, modes))]
+        echo = np.zeros((2, q, q + 1, r, r))
+        kernels.responses(places[e, 1], arrays, table, *own, echo)
+        state, force = rng.standard_normal(modes) + 1j * rng.standard_normal(modes), rng.standard_normal((q + 1, r))
+        # what stands where nothing is wanted counts for nothing
+        known, pushes, later = (rng.standard_normal(rows.shape[1]) for rows in (free, driven, moved))
+        known[:modes], known[pairs : pairs + modes], known[2 * pairs : 2 * pairs + r] = state.real, state.imag, force[0]
+        pushes[: (q + 1) * r], later[: q * r] = force.ravel(), force[1:].ravel()
+        for kind in range(2):
+            expected = (own[2][kind] @ state).real + np.einsum("jab,b->ja", echo[kind, :, 0], force[0])
+            np.testing.assert_allclose((known @ free[3 * kind + e])[: q * r], expected.ravel(), rtol=1e-9)
+            assert np.all((known @ free[3 * kind + e])[q * r :] == 0.0)
+        expected = np.einsum("jiab,ib->ja", echo[0, :, 1:], force[1:]) + force[1:] @ arrays.constant.T
+        np.testing.assert_allclose((later @ moved[e])[: q * r], expected.ravel(), rtol=1e-9)
+        expected = np.einsum("ikb,ib->k", own[1], force)
+        found = pushes @ driven[e]
+        np.testing.assert_allclose(found[:modes] + 1j * found[pairs : pairs + modes], expected, rtol=1e-9)
+        assert np.all(np.delete(found.reshape(2, pairs), np.arange(modes), axis=1) == 0.0)
