@@ -78,6 +78,7 @@ STUDIES = (
     "mutation",
     "physics_pictures",
     "compile",
+    "frozen",
 )
 
 
