@@ -57,13 +57,13 @@ def filterpy_run(kalman: KalmanFilter, measured: np.ndarray, steady: bool) -> np
     """Return the force of a plain filterpy filter with the same matrices, shape (n,)."""
     from filterpy.kalman import KalmanFilter as Plain
 
-    a, seen, force, q = kalman.model.matrices()
+    a, seen, (force,), q = kalman.model.matrices()
     plain = Plain(dim_x=a.shape[0], dim_z=1)
-    plain.F, plain.H, plain.Q, plain.R, plain.P = a, seen[None], q, np.eye(1), kalman.model.first_covariance()
+    plain.F, plain.H, plain.Q, plain.R, plain.P = a, seen, q, np.eye(1), kalman.model.first_covariance()
     # the same gain to the last digit, as its user would set it
-    plain.K = (kalman.gain[-1].T.ravel()[kalman.model.live] * kalman.model.noise)[:, None]
+    plain.K = (kalman.gain[-1, 0].T.ravel()[kalman.model.live] * kalman.model.noise)[:, None]
     result = np.empty(measured.size)
-    for k, z in enumerate(measured / kalman.model.noise):
+    for k, z in enumerate(measured / kalman.model.noise[0]):
         if steady:
             plain.predict_steadystate()
             plain.update_steadystate(np.array([[z]]))
@@ -83,14 +83,14 @@ def step_races(kalman: KalmanFilter, measured: np.ndarray, name: str) -> list[Ra
     """Return a step in the steady state beside filterpy's there and with full covariance."""
     few = measured[:1500]
     steady = replace(kalman, gain=kalman.gain[-1:], variance=kalman.variance[-1:], row=kalman.row[-1:])
-    arrays, state, result = steady._arrays(), np.zeros((2, kalman.model.decay.size)), np.empty((measured.size, 3))
+    arrays, state, result = steady._one_axis(), np.zeros((2, kalman.model.decay.size)), np.empty((measured.size, 3))
 
     def ours() -> None:
-        kalman_steps(*arrays, steady.gain, 0, measured, state, result)
+        kalman_steps(*arrays, steady.gain[:, 0], 0, measured, state, result)
 
-    mine = steady.run(steady.init(), few)[1][:, 0]
+    mine = steady.run(steady.init(), few[:, None])[1][:, 0, 0]
     found = []
-    full = kalman.run(kalman.init(), few[: kalman.gain.shape[0] - 1])[1][:, 0]
+    full = kalman.run(kalman.init(), few[: kalman.gain.shape[0] - 1, None])[1][:, 0, 0]
     states = int(np.sum(kalman.model.live))
     for title, constant, own, count in (("steady state", True, mine, few.size), ("full covariance", False, full, 300)):
         peer = filterpy_run(kalman, few[:count], constant)
@@ -106,7 +106,7 @@ def races() -> list[Race]:
     """Oscillators at the spindle's orders on a made-up flange, 25 600 samples a second."""
     from tests.observer.test_force import monitored
 
-    kalman = monitored(Resonators()).observer.axes[0].kalman
+    kalman = monitored(Resonators()).observer.filters[0]
     return step_races(kalman, 1e-8 * np.random.default_rng(1).normal(size=10240), "resonators")
 
 
@@ -152,7 +152,7 @@ def force_rows(machine: IdentifiedMachine, cut: VirtualCut) -> list[dict[str, An
                 )
             if not smooth:
                 gap = cut.cut.samples[:, 0] * 1.0
-                rows += step_rows(found.observer.axes[0].kalman, gap - gap.mean(), name)
+                rows += step_rows(found.observer.filters[0], gap - gap.mean(), name)
                 rows.append(_whole_row(found, cut, name))
     return rows
 
@@ -166,8 +166,8 @@ def coupled_rows() -> list[dict[str, Any]]:
         for machine in (oblique_machine(), measured_flange(cross=False)):
             found = observe(machine, cut.tooling.assembly, 2, cut.cut, cut.air, CASE.spindle_speed, Resonators(), None, smooth)
             errors.append(relative_error(found.estimate.force, cut.force, cut.cut.rate))
-            together = found.observer.together
-            if together is not None and not smooth:
+            together = found.observer.filters[0]
+            if together.count == 2 and not smooth:
                 measured, state = 1e-8 * np.random.default_rng(1).normal(size=(10240, 2)), together.init()
                 seconds = best_of(partial(together.run, state, measured)) / measured.shape[0]
                 gap, acceleration = cut.cut.samples[:1024, :2], cut.cut.samples[:1024, 2:4]

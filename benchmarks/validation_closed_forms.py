@@ -128,9 +128,9 @@ def conditional(ours: bool) -> np.ndarray:
     force = 60.0 * (np.sin(200.0 * t) > 0.3) + 10.0 * np.sin(333.0 * t)
     measured = test_kalman.PLANT.run(test_kalman.PLANT.init(), force)[1]
     if ours:
-        return kalman.run(kalman.init(), measured)[1][:, 0]
+        return test_kalman.run(kalman, measured)[1][:, 0]
     _, both, seen = test_kalman.joint_gaussian(kalman, 25)
-    z = measured / kalman.model.noise
+    z = measured / kalman.model.noise[0]
     return np.array([np.linalg.solve(seen[:k, :k], both[k - 1, :k]) @ z[:k] for k in range(1, 26)])
 
 
@@ -139,21 +139,21 @@ def scalar_riccati(ours: bool) -> np.ndarray:
     intensity = np.array([1e-4, 1e-2, 1.0, 30.0])
     if not ours:
         return 0.5 * (intensity + np.sqrt(intensity**2 + 4.0 * intensity))
-    return np.array([riccati(np.eye(1), np.ones(1), np.array([[q]]))[0, 0] for q in intensity])
+    return np.array([riccati(np.eye(1), np.ones((1, 1)), np.array([[q]]))[0, 0] for q in intensity])
 
 
 def observer_riccati(ours: bool) -> np.ndarray:
     """Predicted covariance of a whole observer over its largest entry."""
-    a, seen, _, q = test_kalman.model().matrices()
+    a, seen, _, q = test_kalman.dense(test_kalman.model())
     other = scipy.linalg.solve_discrete_are(a.T, seen[:, None], q, np.eye(1))
-    return (riccati(a, seen, q) if ours else other) / np.max(np.abs(other))
+    return (riccati(a, seen[None], q) if ours else other) / np.max(np.abs(other))
 
 
 def filtered(ours: bool) -> np.ndarray:
     """Forces of 500 samples, through the settling phase, over the largest."""
     kalman = kalman_filter(test_kalman.model(RandomWalk(40.0, 30.0)), longest_settling=1000)
     measured = 1e-6 * np.random.default_rng(3).normal(size=500)
-    own = kalman.run(kalman.init(), measured)[1][:, 0]
+    own = test_kalman.run(kalman, measured)[1][:, 0]
     _, force, means, _ = test_kalman.plain_filter(kalman, measured)
     return (own if ours else means[:, :, 0] @ force) / np.max(np.abs(own))
 

@@ -114,19 +114,6 @@ def smoothed_force(decay, observed, plants, forces, through, gain, variance, row
 
 
 @numba.njit(cache=True, fastmath=True)
-def lagged_force(weight, innovation, force):
-    """Return the force `weight.size` samples ago given all since, shape (n - lag,); innovation, force: shape (n,)."""
-    lag = weight.size
-    result = np.empty(max(force.size - lag, 0))
-    for k in range(result.size):
-        more = 0.0
-        for j in range(lag):
-            more += weight[j] * innovation[k + 1 + j]
-        result[k] = force[k] + more
-    return result
-
-
-@numba.njit(cache=True, fastmath=True)
 def coupled_steps(decay, inputs, observed, ends, through, gain, first, measured, state, result):
     """As `kalman_steps`, of several forces that feel each other and as many measurements; the plant's modes are shared.
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.observer.coupled_filter import coupled_filter
-from rcsa_ident.observer.coupled_model import AxisNoise, CoupledTransfer, coupled_model
-from rcsa_ident.observer.force import AxisObserver, ForceObserver, RunOut
-from rcsa_ident.observer.force_model import ForceModel, augmented
+from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.observer.coupled_transfer import CoupledTransfer
+from rcsa_ident.observer.force import AxisSensors, ForceObserver, RunOut
+from rcsa_ident.observer.force_model import AxisNoise, ForceModel, augmented
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.transfer_function import CORNER, SampledModes, TransferFunction, acceleration_filter, high_pass
 
@@ -66,21 +66,10 @@ class AxisSettings:
         return below[below > CORNER * band[0]]
 
 
-def axis_observer(settings: AxisSettings, transfer: TransferFunction) -> AxisObserver:
-    """Return one axis of an observer, with a filter of its own."""
-    step, band = transfer.step, transfer.band
-    passing = settings.acceleration_filter(step, band)
-    model = augmented(
-        transfer.behind_high_pass(CORNER * band[0]),
-        settings.force,
-        settings.noise,
-        acceleration=passing,
-        acceleration_noise=settings.acceleration_noise,
-        disturbance=settings.disturbance(band),
-        disturbance_intensity=_ORDER_WANDER,
-    )
-    own = high_pass(CORNER * band[0], step)
-    return AxisObserver(settings.axis, transfer, CORNER * band[0], own, passing, kalman_filter(model), settings.run_out)
+def axis_observer(settings: AxisSettings, transfer: TransferFunction) -> ForceObserver:
+    """Return the observer of one axis."""
+    plant = transfer.behind_high_pass(CORNER * transfer.band[0]).pole_residue()
+    return _observer([settings], [transfer], plant)
 
 
 def coupled_observer(settings: Sequence[AxisSettings], transfer: CoupledTransfer) -> ForceObserver:
@@ -92,11 +81,17 @@ def coupled_observer(settings: Sequence[AxisSettings], transfer: CoupledTransfer
         In the order of the transfer function's rows and columns.
     transfer : CoupledTransfer
     """
-    step, band = transfer.step, transfer.band
+    direct = [transfer.direct(i) for i in range(len(settings))]
+    return _observer(settings, direct, transfer.behind_high_pass(CORNER * transfer.band[0]))
+
+
+def _observer(settings: Sequence[AxisSettings], transfers: Sequence[TransferFunction], plant: PoleResidue) -> ForceObserver:
+    """The observer of a plant from forces to high-passed displacements; `transfers` are its direct entries."""
+    step, band = transfers[0].step, transfers[0].band
     corner = CORNER * band[0]
     axes, noises = [], []
-    for i, each in enumerate(settings):
+    for each, transfer in zip(settings, transfers, strict=True):
         passing = each.acceleration_filter(step, band)
-        axes.append(AxisObserver(each.axis, transfer.direct(i), corner, high_pass(corner, step), passing, None, each.run_out))
+        axes.append(AxisSensors(each.axis, transfer, corner, high_pass(corner, step), passing, each.run_out))
         noises.append(AxisNoise(each.force, each.noise, passing, each.acceleration_noise, each.disturbance(band), _ORDER_WANDER))
-    return ForceObserver(tuple(axes), coupled_filter(coupled_model(transfer.behind_high_pass(corner), noises, step)))
+    return ForceObserver(tuple(axes), (kalman_filter(augmented(plant, noises, step)),))

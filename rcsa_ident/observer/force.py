@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,7 +12,6 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer.coupled_filter import CoupledFilter
 from rcsa_ident.observer.kalman import FilterState, KalmanFilter
 from rcsa_ident.observer.transfer_function import SampledModes, TransferFunction
 from rcsa_ident.shown import Saved
@@ -64,8 +64,8 @@ class RunOut:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AxisObserver:
-    """One axis of the observer.
+class AxisSensors:
+    """What one axis' sensors show of the flange's displacement, and how it follows the force.
 
     Parameters
     ----------
@@ -76,8 +76,6 @@ class AxisObserver:
         Corner frequency of the high-pass that gap and fixture's motion share.
     gap_filter, acceleration_filter : SampledModes
         The latter None without an accelerometer: the gap is then taken for the flange's motion.
-    kalman : KalmanFilter or None
-        None where the axes feel each other: one filter then serves all of them.
     run_out : RunOut or None
         Taken out of the signals where it is known.
     """
@@ -87,35 +85,22 @@ class AxisObserver:
     corner: float
     gap_filter: SampledModes
     acceleration_filter: SampledModes | None
-    kalman: KalmanFilter | None
     run_out: RunOut | None = None
 
-    def to_control(self) -> Any:
-        """Return the observer in the steady state as python-control's sampled ``StateSpace``.
-
-        Inputs are ``gap`` [m] and, with an accelerometer, ``acceleration`` [m/s^2], run-out taken out of both; outputs ``force`` [N]
-        and ``innovation`` [m].
-        """
-        import control
-
-        if self.kalman is None:
-            raise InputError(
-                "observer", f"{self.axis.upper()}, which feels the other axis", "`ForceObserver.to_control`: both axes at once"
-            )
-        filters = [each.state_space().to_control() for each in (self.gap_filter, self.acceleration_filter) if each is not None]
-        added = control.ss([], [], [], np.ones((1, len(filters))), self.transfer.step)
-        whole = self.kalman.state_space().to_control() * added * control.append(*filters)
-        return control.ss(whole, inputs=["gap", "acceleration"][: len(filters)], outputs=["force", "innovation"])
+    @property
+    def filters(self) -> dict[str, SampledModes]:
+        """What gap and, with an accelerometer, acceleration pass before they are added, by what they are called."""
+        found = {"gap": self.gap_filter, "acceleration": self.acceleration_filter}
+        return {name: each for name, each in found.items() if each is not None}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisState:
-    """Where one axis of a stream stands: the first gap sample (its mean is not observable), both filters, its own Kalman filter."""
+    """Where the sensors of one axis of a stream stand: the first gap sample (its mean is not observable) and both filters."""
 
     offset: float
     gap: FloatArray
     acceleration: FloatArray
-    filter: FilterState | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,18 +112,17 @@ class ObserverState:
     count : int
         Samples seen.
     axes : tuple of AxisState
-    together : FilterState or None
-        Of the filter that serves all axes.
+    filters : tuple of FilterState
     """
 
     count: int
     axes: tuple[AxisState, ...]
-    together: FilterState | None = None
+    filters: tuple[FilterState, ...]
 
     @property
     def filtered(self) -> int:
         """Samples since the observer began, or began anew behind a gap."""
-        return max(each.count for each in (self.together, *(axis.filter for axis in self.axes)) if each is not None)
+        return max(each.count for each in self.filters)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,13 +191,19 @@ class ForceObserver:
 
     Parameters
     ----------
-    axes : tuple of AxisObserver
-    together : CoupledFilter or None
-        Of axes that feel each other, in their order; None where each has a filter of its own.
+    axes : tuple of AxisSensors
+    filters : tuple of KalmanFilter
+        In the order of the axes, each for as many of them as feel each other.
     """
 
-    axes: tuple[AxisObserver, ...]
-    together: CoupledFilter | None = None
+    axes: tuple[AxisSensors, ...]
+    filters: tuple[KalmanFilter, ...]
+
+    @property
+    def groups(self) -> tuple[slice, ...]:
+        """The axes of each filter."""
+        ends = itertools.accumulate((each.count for each in self.filters), initial=0)
+        return tuple(slice(*each) for each in itertools.pairwise(ends))
 
     @property
     def step_time(self) -> float:
@@ -224,22 +214,21 @@ class ForceObserver:
     def settling(self) -> int:
         """Samples from the first after which the start has died out: forces before them are those of the observer, not of the cut.
 
-        The estimate's error dies out with the closed-loop poles z of the Kalman filter, and of the filters before it: to 2 % within
+        The estimate's error dies out with the closed-loop poles z of the Kalman filters, and of the filters before them: to 2 % within
         ln 50 / -ln max |z| samples. By then all gains are steady, too.
         """
-        kalman = [each for each in (self.together, *(axis.kalman for axis in self.axes)) if each is not None]
-        before = [each for axis in self.axes for each in (axis.gap_filter, axis.acceleration_filter) if each is not None]
-        poles = [*(np.linalg.eigvals(each.state_space().A) for each in kalman), *(each.decay for each in before)]
+        before = [each for axis in self.axes for each in axis.filters.values()]
+        poles = [*(np.linalg.eigvals(each.state_space().A) for each in self.filters), *(each.decay for each in before)]
         slowest = max(float(np.max(np.abs(each))) for each in poles if each.size)
-        return max(int(np.ceil(np.log(LEFT) / np.log(slowest))), *(each.gain.shape[0] for each in kalman))
+        return max(int(np.ceil(np.log(LEFT) / np.log(slowest))), *(each.gain.shape[0] for each in self.filters))
 
     def init(self) -> ObserverState:
         """Return the state before the first sample."""
         states = []
         for each in self.axes:
             shaken = np.zeros((2, 0)) if each.acceleration_filter is None else each.acceleration_filter.init()
-            states.append(AxisState(np.nan, each.gap_filter.init(), shaken, None if each.kalman is None else each.kalman.init()))
-        return ObserverState(0, tuple(states), None if self.together is None else self.together.init())
+            states.append(AxisState(np.nan, each.gap_filter.init(), shaken))
+        return ObserverState(0, tuple(states), tuple(each.init() for each in self.filters))
 
     def to_control(self) -> Any:
         """Return the observer in the steady state as python-control's sampled ``StateSpace``, all axes at once.
@@ -249,21 +238,19 @@ class ForceObserver:
         """
         import control
 
-        names = [each.axis for each in self.axes]
-        outputs = [f"{kind}_{name}" for kind in ("force", "innovation") for name in names]
-        if self.together is None:
-            parts = [each.to_control() for each in self.axes]
-            inputs = [f"{kind}_{name}" for name, part in zip(names, parts, strict=True) for kind in part.input_labels]
-            whole = control.append(*parts)
-            order = [*range(0, whole.noutputs, 2), *range(1, whole.noutputs, 2)]
-            return control.ss(whole[order, :], inputs=inputs, outputs=outputs)
-        filters, inputs = [], []
-        for each in self.axes:
-            own = [one.state_space().to_control() for one in (each.gap_filter, each.acceleration_filter) if one is not None]
-            filters.append(control.ss([], [], [], np.ones((1, len(own))), self.step_time) * control.append(*own))
-            inputs += [f"{kind}_{each.axis}" for kind in ("gap", "acceleration")[: len(own)]]
-        whole = self.together.state_space().to_control() * control.append(*filters)
-        return control.ss(whole, inputs=inputs, outputs=outputs)
+        parts, force, innovation = [], list[int](), list[int]()
+        for kalman, group in zip(self.filters, self.groups, strict=True):
+            own = []
+            for each in self.axes[group]:
+                filters = [one.state_space().to_control() for one in each.filters.values()]
+                own.append(control.ss([], [], [], np.ones((1, len(filters))), self.step_time) * control.append(*filters))
+            parts.append(kalman.state_space().to_control() * control.append(*own))
+            first = len(force) + len(innovation)
+            force += range(first, first + kalman.count)
+            innovation += range(first + kalman.count, first + 2 * kalman.count)
+        inputs = [f"{name}_{each.axis}" for each in self.axes for name in each.filters]
+        outputs = [f"{kind}_{each.axis}" for kind in ("force", "innovation") for each in self.axes]
+        return control.ss(control.append(*parts)[[*force, *innovation], :], inputs=inputs, outputs=outputs)
 
     def step(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
         """Return the state and the estimates after one sample of each axis.
@@ -295,25 +282,20 @@ class ForceObserver:
             raise InputError("samples", np.shape(gap), f"one column for each of {len(self.axes)} axes, accelerations alike")
         if not np.all(np.isfinite(gap)) or (acceleration is not None and not np.all(np.isfinite(acceleration))):
             raise InputError("samples", "a lost sample", "finite numbers")
-        states, shown, results = [], [], []
+        states, displacement = [], np.empty(gap.shape, order="F")
         for i, each in enumerate(self.axes):
-            after, measured = _displacement(
+            after, displacement[:, i] = _displacement(
                 each, state.axes[i], state.count, gap[:, i], None if acceleration is None else acceleration[:, i]
             )
-            if each.kalman is not None and after.filter is not None:
-                filter_state, result = each.kalman.predict(after.filter, measured.size) if lost else each.kalman.run(after.filter, measured)
-                after = replace(after, filter=filter_state)
-                results.append(result)
             states.append(after)
-            shown.append(measured)
-        together, count = state.together, gap.shape[0]
-        if self.together is not None and together is not None:
-            both = np.stack(shown, axis=1)
-            together, found = self.together.predict(together, count) if lost else self.together.run(together, both)
-            joined = found.transpose(0, 2, 1)
-        else:
-            joined = np.stack(results, axis=1) if count else np.zeros((0, len(self.axes), 3))
-        return ObserverState(state.count + count, tuple(states), together), ForceBlock(*(joined[:, :, c] for c in range(3)))
+        filters, parts = [], []
+        for kalman, group, before in zip(self.filters, self.groups, state.filters, strict=True):
+            own = displacement[:, group]
+            now, found = kalman.predict(before, len(own)) if lost else kalman.run(before, own)
+            filters.append(now)
+            parts.append(found)
+        found = np.concatenate(parts, axis=2)
+        return ObserverState(state.count + gap.shape[0], tuple(states), tuple(filters)), ForceBlock(*(found[:, c] for c in range(3)))
 
     def bridge(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
         """Return the state after samples that were lost, and what was to be expected at them.
@@ -349,19 +331,18 @@ class ForceObserver:
         n = block.force.shape[0]
         settled = min(self.settling, n // 2)
         force, deviation, consistency = np.array(block.force), np.empty_like(block.force), np.ones(len(self.axes))
-        if self.together is not None:
+        for kalman, group in zip(self.filters, self.groups, strict=True):
             if smooth:
-                force = self.together.smooth(np.stack([block.force, block.walking, block.innovation], axis=1))
-            deviation = self.together.standard_deviation(n, smooth)
-        for i, each in enumerate(self.axes):
-            variance = None if self.together is None else float(self.together.variance[-1, i, i])
-            if each.kalman is not None:
-                variance = float(each.kalman.variance[-1])
-                if smooth:
-                    force[:, i] = each.kalman.smooth(np.stack([block.force[:, i], block.walking[:, i], block.innovation[:, i]], axis=1))
-                deviation[:, i] = each.kalman.standard_deviation(n, smooth)
-            assert variance is not None
-            consistency[i] = _scatter(block.innovation[settled:, i], each.transfer, variance)
+                force[:, group] = kalman.smooth(
+                    np.stack([block.force[:, group], block.walking[:, group], block.innovation[:, group]], axis=1)
+                )
+            deviation[:, group] = kalman.standard_deviation(n, smooth)
+            consistency[group] = [
+                _scatter(innovation, each.transfer, variance)
+                for innovation, each, variance in zip(
+                    block.innovation[settled:, group].T, self.axes[group], np.diagonal(kalman.variance[-1]), strict=True
+                )
+            ]
         deviation = deviation * np.maximum(consistency, 1.0)
         return ForceEstimate(tuple(each.axis for each in self.axes), self.step_time, frozen(force), frozen(deviation), frozen(consistency))
 
@@ -391,11 +372,12 @@ def restore_mean_force(estimate: ForceEstimate, idle: float) -> tuple[ForceEstim
     return replace(estimate, force=frozen(estimate.force + np.array(levels))), frozen(levels)
 
 
-def force_observer(axes: Sequence[AxisObserver]) -> ForceObserver:
-    """Return the observer of some axes, all sampled alike."""
+def force_observer(parts: Sequence[ForceObserver]) -> ForceObserver:
+    """Return the observer of the axes of several, all sampled alike, that do not feel each other."""
+    axes = tuple(axis for each in parts for axis in each.axes)
     if not axes or len({each.transfer.step for each in axes}) > 1:
         raise InputError("axes", len(axes), "one or more with the same sampling rate")
-    return ForceObserver(tuple(axes))
+    return ForceObserver(axes, tuple(kalman for each in parts for kalman in each.filters))
 
 
 def _scatter(innovation: FloatArray, transfer: TransferFunction, variance: float) -> float:
@@ -412,22 +394,22 @@ def _scatter(innovation: FloatArray, transfer: TransferFunction, variance: float
 
 
 def _displacement(
-    observer: AxisObserver, state: AxisState, first: int, gap: FloatArray, acceleration: FloatArray | None
+    sensors: AxisSensors, state: AxisState, first: int, gap: FloatArray, acceleration: FloatArray | None
 ) -> tuple[AxisState, FloatArray]:
     """High-passed absolute displacement of the flange, run-out taken out, and the filters' new states."""
-    if observer.run_out is not None:
-        still, shaken = observer.run_out.signals(first, gap.size, observer.transfer.step)
+    if sensors.run_out is not None:
+        still, shaken = sensors.run_out.signals(first, gap.size, sensors.transfer.step)
         gap = gap - still
         acceleration = None if acceleration is None else acceleration - shaken
     offset = state.offset
     if not np.isfinite(offset) and gap.size:
         # the mean is not observable: without it the high-pass has less to forget
         offset = float(gap[0])
-    passed, measured = observer.gap_filter.run(state.gap, gap - offset)
+    passed, measured = sensors.gap_filter.run(state.gap, gap - offset)
     shaken_state = state.acceleration
-    if observer.acceleration_filter is not None:
+    if sensors.acceleration_filter is not None:
         if acceleration is None:
             raise InputError("acceleration", "none", "the fixture's acceleration, which this observer was made for")
-        shaken_state, more = observer.acceleration_filter.run(state.acceleration, acceleration)
+        shaken_state, more = sensors.acceleration_filter.run(state.acceleration, acceleration)
         measured = measured + more
-    return AxisState(offset, passed, shaken_state, state.filter), measured
+    return AxisState(offset, passed, shaken_state), measured

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.observer.transfer_function import SampledModes
 
@@ -81,41 +82,72 @@ class TeethResonators:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class AxisNoise:
+    """What one axis' force and sensors add to the augmented model.
+
+    Parameters
+    ----------
+    force : ForceModel
+    noise : float [m]
+        Standard deviation of a displacement sample: the measurement noise of [inprocess], eq. 17.
+    acceleration : SampledModes or None
+        Filter from the fixture's acceleration to displacement: it colours the accelerometer's noise.
+    acceleration_noise : float [m/s^2]
+        Standard deviation of a sample.
+    disturbance : array, shape (d,) [rad/s]
+        Frequencies at which the measurement is not believed: orders of the spindle below the identified band.
+    disturbance_intensity : float [m/sqrt(s)]
+    """
+
+    force: ForceModel
+    noise: float
+    acceleration: SampledModes | None = None
+    acceleration_noise: float = 0.0
+    disturbance: FloatArray | Sequence[float] = ()
+    disturbance_intensity: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class AugmentedModel:
-    """Plant, force and what disturbs the measurement, as modes in that order (see `_kernels`).
+    """A plant that all forces enter, the modes of each force, then those of each sensor's noise (see `_kernels`).
 
     Parameters
     ----------
     decay : complex array, shape (m,) [-]
         Factor of each mode from one sample to the next.
-    observed : complex array, shape (m,)
-        The measurement is sum Re(observed x) + through * force + noise.
-    counts : two ints
-        Number of plant modes and of force modes.
-    through : float [m/N]
+    inputs : complex array, shape (plants, c)
+        What a force adds to the plant's modes.
+    observed : complex array, shape (c, m)
+        Measurement j is sum Re(observed[j] x) + through[j] @ force + noise.
+    ends : tuple of c + 1 ints
+        Where the plant's modes end, and then those of each force.
+    through : array, shape (c, c) [m/N]
     drive : array, shape (m,)
         Standard deviation of what is added, per step, to the real and to the imaginary part of a force or noise mode.
-    common : array, shape (m,)
-        Standard deviation of what one and the same noise adds to the modes' real parts: the unmodelled force to the plant's,
-        the accelerometer's noise to those of its filter.
-    noise : float [m]
+    common : array, shape (c, m)
+        Standard deviation of what each axis' accelerometer noise adds to the modes' real parts.
+    noise : array, shape (c,) [m]
         Standard deviation of a measured sample.
     step : float [s]
     """
 
     decay: ComplexArray
+    inputs: ComplexArray
     observed: ComplexArray
-    counts: tuple[int, int]
-    through: float
+    ends: tuple[int, ...]
+    through: FloatArray
     drive: FloatArray
     common: FloatArray
-    noise: float
+    noise: FloatArray
     step: float
 
     def __post_init__(self) -> None:
-        for name, dtype in (("decay", complex), ("observed", complex), ("drive", float), ("common", float)):
-            object.__setattr__(self, name, frozen(getattr(self, name), dtype))
-        positive("measurement noise", self.noise, "m")
+        for name in ("decay", "inputs", "observed"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
+        for name in ("through", "drive", "common", "noise"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        if not np.all(self.noise > 0.0):
+            raise InputError("measurement noise", self.noise.tolist(), "numbers above 0 [m]")
 
     @property
     def live(self) -> np.ndarray:
@@ -125,80 +157,87 @@ class AugmentedModel:
         return live.ravel()
 
     def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return A (n, n), H (n,), the force's row (n,) and Q (n, n) of the live real states, the measurement in units of its noise."""
-        m, (plants, forces) = self.decay.size, self.counts
+        """Return A (n, n), H (c, n), the forces' rows (c, n) and Q (n, n) of the live real states, measurements in units of their noise."""
+        m, plants, count = self.decay.size, self.ends[0], self.noise.size
         a, q = np.zeros((m, 2, m, 2)), np.zeros((m, 2, m, 2))
         i, re, im = np.arange(m), self.decay.real, self.decay.imag
         a[i, 0, i, 0], a[i, 0, i, 1], a[i, 1, i, 0], a[i, 1, i, 1] = re, -im, im, re
-        a[:plants, 0, plants : plants + forces, 0] = 1.0
-        row, seen = np.zeros((m, 2)), np.stack([self.observed.real, -self.observed.imag], axis=1)
-        row[plants : plants + forces, 0] = 1.0
-        seen = (seen + self.through * row) / self.noise
+        rows, seen = np.zeros((count, m, 2)), np.stack([self.observed.real, -self.observed.imag], axis=2)
+        for c in range(count):
+            own = slice(self.ends[c], self.ends[c + 1])
+            a[:plants, 0, own, 0], a[:plants, 1, own, 0] = self.inputs[:, c, None].real, self.inputs[:, c, None].imag
+            rows[c, own, 0] = 1.0
+        seen = (seen + np.tensordot(self.through, rows, axes=1)) / self.noise[:, None, None]
         for part in (0, 1):
             q[i, part, i, part] = self.drive**2
-        for group in (i < plants, i >= plants + forces):
-            shared = np.where(group, self.common, 0.0)
+        for shared in self.common:
             q[:, 0, :, 0] += np.outer(shared, shared)
         live = self.live
         keep = np.ix_(live, live)
-        return a.reshape(2 * m, 2 * m)[keep], seen.ravel()[live], row.ravel()[live], q.reshape(2 * m, 2 * m)[keep]
+        return (
+            a.reshape(2 * m, 2 * m)[keep],
+            seen.reshape(count, -1)[:, live],
+            rows.reshape(count, -1)[:, live],
+            q.reshape(2 * m, 2 * m)[keep],
+        )
 
     def first_covariance(self) -> FloatArray:
-        """Return the live states' covariance before the first sample: a machine at rest, a force that nobody knows."""
-        plants, forces = self.counts
-        spread = np.maximum(self.drive, 10.0 * self.common)
-        spread[:plants] = 0.0
-        spread[plants : plants + forces] = FIRST_FORCE
-        later = np.arange(spread.size) >= plants + forces
+        """Return the live states' covariance before the first sample: a machine at rest, forces that nobody knows."""
+        spread = np.maximum(self.drive, 10.0 * self.common.max(axis=0))
+        spread[: self.ends[0]] = 0.0
+        spread[self.ends[0] : self.ends[-1]] = FIRST_FORCE
+        later = np.arange(spread.size) >= self.ends[-1]
         spread[later & (self.drive > 0.0)] = FIRST_DISTURBANCE
         return np.diag((np.repeat(spread, 2) ** 2)[self.live])
 
 
-def augmented(
-    plant: SampledModes,
-    force: ForceModel,
-    noise: float,
-    *,
-    unmodelled: float = 0.0,
-    acceleration: SampledModes | None = None,
-    acceleration_noise: float = 0.0,
-    disturbance: Sequence[float] | FloatArray = (),
-    disturbance_intensity: float = 0.0,
-) -> AugmentedModel:
-    """Return the augmented model of one axis.
+def augmented(plant: PoleResidue, axes: Sequence[AxisNoise], step: float) -> AugmentedModel:
+    """Return the augmented model of one axis, or of several that feel each other.
 
     Parameters
     ----------
-    plant : SampledModes
-        Tip force to measured displacement [m/N].
-    force : ForceModel
-    noise : float [m]
-        Standard deviation of a displacement sample: the measurement noise of [inprocess], eq. 17.
-    unmodelled : float [N]
-        Process noise of [inprocess], eq. 17: standard deviation of a force sample that the force model cannot follow.
-    acceleration : SampledModes, optional
-        Filter from the fixture's acceleration to displacement: it colours the accelerometer's noise.
-    acceleration_noise : float [m/s^2]
-        Standard deviation of a sample.
-    disturbance : array, shape (d,) [rad/s]
-        Frequencies at which the measurement holds what is not believed: orders of the spindle below the identified band.
-    disturbance_intensity : float [m/sqrt(s)]
+    plant : PoleResidue
+        Tip forces to measured displacements, sampled [m/N].
+    axes : sequence of AxisNoise, one for each force and measurement
+    step : float [s]
     """
-    step = plant.step
-    decay, drive = force.modes(step)
-    kinds: list[tuple[Any, ...]] = [
-        (plant.decay, 2.0 * plant.gain, 0.0, non_negative("unmodelled force", unmodelled, "N")),
-        (decay, 0.0, drive, 0.0),
-    ]
-    direct = 0.0
-    if acceleration is not None and acceleration_noise > 0.0:
-        kinds.append((acceleration.decay, 2.0 * acceleration.gain, 0.0, acceleration_noise))
-        direct = acceleration.through * acceleration_noise
-    if len(disturbance):
-        spread = positive("disturbance intensity", disturbance_intensity, "m/sqrt(s)") * np.sqrt(step)
-        kinds.append((np.exp(1j * np.asarray(disturbance) * step), 1.0, spread, 0.0))
-    columns = [np.concatenate([np.broadcast_to(kind[c], kind[0].shape) for kind in kinds]) for c in range(4)]
-    total = float(np.hypot(positive("measurement noise", noise, "m"), direct))
+    count, plants = len(axes), plant.pole.size
+    outputs, inputs = plant.outputs, plant.inputs
+    if count == 1:
+        # one force enters the real parts alone
+        outputs, inputs = outputs * inputs[:, 0], np.ones_like(inputs)
+    decay, drive, ends = [plant.pole], [np.zeros(plants)], [plants]
+    for each in axes:
+        own, spread = each.force.modes(step)
+        decay.append(own)
+        drive.append(spread)
+        ends.append(ends[-1] + own.size)
+    observed = [2.0 * outputs, np.zeros((count, ends[-1] - plants))]
+    common, total = [np.zeros((count, ends[-1]))], []
+    for j, each in enumerate(axes):
+        unit, direct = np.eye(count)[:, j : j + 1], 0.0
+        if each.acceleration is not None and each.acceleration_noise > 0.0:
+            coloured = each.acceleration
+            decay.append(coloured.decay)
+            observed.append(unit * 2.0 * coloured.gain)
+            drive.append(np.zeros(coloured.decay.size))
+            common.append(unit * np.full(coloured.decay.size, each.acceleration_noise))
+            direct = coloured.through * each.acceleration_noise
+        if len(each.disturbance):
+            believed = np.asarray(each.disturbance, dtype=float)
+            decay.append(np.exp(1j * believed * step))
+            observed.append(unit * np.ones(believed.size))
+            drive.append(np.full(believed.size, positive("disturbance intensity", each.disturbance_intensity, "m/sqrt(s)") * np.sqrt(step)))
+            common.append(np.zeros((count, believed.size)))
+        total.append(float(np.hypot(positive("measurement noise", each.noise, "m"), direct)))
     return AugmentedModel(
-        columns[0], columns[1], (plant.decay.size, decay.size), plant.through, columns[2].real, columns[3].real, total, step
+        np.concatenate(decay),
+        inputs,
+        np.hstack(observed),
+        tuple(ends),
+        plant.constant,
+        np.concatenate(drive),
+        np.hstack(common),
+        np.array(total),
+        step,
     )

@@ -1,15 +1,19 @@
-"""Kalman filter [kalman1960] of the augmented state {q, f} ([inprocess], eq. 17): settling, steady, streaming, fixed lag, smoothing."""
+"""Kalman filter [kalman1960] of the augmented state {q, f} ([inprocess], eq. 17): settling, steady, streaming, smoothing.
+
+One filter serves one axis, or all axes that feel each other: a force and a measurement for each.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer._kernels import kalman_steps, lagged_force, smoothed_force
+from rcsa_ident.observer._kernels import coupled_smoothed, coupled_steps, kalman_steps, smoothed_force
 from rcsa_ident.observer.force_model import AugmentedModel
 
 #: Relative distance of a gain from its steady value at which the settling phase ends, and its longest duration in steps.
@@ -25,30 +29,27 @@ class FilterState:
     count : int
         Samples seen.
     modes : array, shape (2, m)
-    waiting : array, shape (w, 3)
-        Results that a fixed lag still holds back.
     """
 
     count: int
     modes: FloatArray
-    waiting: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KalmanFilter:
-    """Gains of one axis: a settling phase of full covariance, then the steady state.
+    """Gains for c forces and as many measurements: a settling phase of full covariance, then the steady state.
 
     Parameters
     ----------
     model : AugmentedModel
-    gain : array, shape (s, 2, m)
-        The last is the steady one.
-    variance : array, shape (s,) [m^2]
-        Variance of the innovation.
-    row : array, shape (s, 2, m)
-        Covariance of the force with the state after the correction.
-    force_variance : array, shape (s,) [N^2]
-        Variance of the force after the correction.
+    gain : array, shape (s, c, 2, m)
+        Of each measurement; the last is the steady one.
+    variance : array, shape (s, c, c) [m^2]
+        Covariance of the innovations.
+    row : array, shape (s, c, 2, m)
+        Covariance of each force with the state after the correction.
+    force_variance : array, shape (s, c) [N^2]
+        Variance of each force after the correction.
     """
 
     model: AugmentedModel
@@ -57,62 +58,49 @@ class KalmanFilter:
     row: FloatArray
     force_variance: FloatArray
 
+    @property
+    def count(self) -> int:
+        """Number of forces, and of measurements."""
+        return self.model.noise.size
+
     def init(self) -> FilterState:
         """Return the state before the first sample."""
-        return FilterState(0, np.zeros((2, self.model.decay.size)), np.zeros((0, 3)))
-
-    def step(self, state: FilterState, measured: float) -> tuple[FilterState, FloatArray]:
-        """Return the state and (force, its walking part, innovation) after one sample."""
-        state, result = self.run(state, np.array([measured]))
-        return state, result[0]
+        return FilterState(0, np.zeros((2, self.model.decay.size)))
 
     def run(self, state: FilterState, measured: FloatArray) -> tuple[FilterState, FloatArray]:
-        """Return the state after a block, and force [N], its walking part [N] and innovation [m] at its samples, shape (n, 3)."""
-        modes, measured = np.array(state.modes), np.ascontiguousarray(measured, dtype=float)
-        result = np.empty((measured.size, 3))
-        kalman_steps(*self._arrays(), self.gain, state.count, measured, modes, result)
-        return FilterState(state.count + measured.size, modes, state.waiting), result
-
-    def predict(self, state: FilterState, count: int) -> tuple[FilterState, FloatArray]:
-        """Return the state after samples that nobody has measured, and the same at them as `run`, innovations 0, shape (n, 3)."""
-        modes, result = np.array(state.modes), np.empty((count, 3))
-        # an innovation that corrects nothing
-        still = frozen(np.zeros((1, *modes.shape)))
-        kalman_steps(*self._arrays(), still, 0, np.zeros(count), modes, result)
-        result[:, 2] = 0.0
-        return FilterState(state.count + count, modes, state.waiting), result
-
-    def run_lagged(self, state: FilterState, measured: FloatArray, weight: FloatArray) -> tuple[FilterState, FloatArray]:
-        """Return the state after a block, and the force `weight.size` samples before each sample, as far as there is one.
+        """Return the state after a block, and forces [N], their walking parts [N] and innovations [m] at its samples, shape (n, 3, c).
 
         Parameters
         ----------
         state : FilterState
-        measured : array, shape (n,) [m]
-        weight : array, shape (lag,) [N/m]
-            As `lag_weights` gives them.
-
-        Returns
-        -------
-        FilterState and array, shape (k,) [N]
-            In the first block the lag is missing: k = n - lag; later ones are complete.
+        measured : array, shape (n, c) [m]
         """
-        state, result = self.run(state, measured)
-        joined = np.concatenate([state.waiting, result])
-        force = lagged_force(weight, np.ascontiguousarray(joined[:, 2]), np.ascontiguousarray(joined[:, 0]))
-        return replace(state, waiting=joined[force.size :]), force
+        return self._scan(state, self.gain, state.count, np.ascontiguousarray(measured, dtype=float))
+
+    def predict(self, state: FilterState, count: int) -> tuple[FilterState, FloatArray]:
+        """Return the state after samples that nobody has measured, and the same at them as `run`, innovations 0, shape (n, 3, c)."""
+        # innovations that correct nothing
+        still = frozen(np.zeros((1, *self.gain.shape[1:])))
+        after, result = self._scan(state, still, 0, np.zeros((count, self.count)))
+        result[:, 2] = 0.0
+        return after, result
 
     def smooth(self, result: FloatArray) -> FloatArray:
-        """Return the force given the whole record, shape (n,) [N]; `result` is that of `run` from the first sample on.
+        """Return the forces given the whole record, shape (n, c) [N]; `result` is that of `run` from the first sample on.
 
         The fixed-interval smoother of Rauch, Tung and Striebel [rauch1965] in the form of Bryson and Frazier [bryson1963], which needs no
         inverse of a covariance and costs as little as the filter.
         """
-        force, innovation = (np.ascontiguousarray(result[:, c]) for c in (0, 2))
-        return smoothed_force(*self._arrays(), self.gain, self.variance, self.row, innovation, force)
+        force, innovation = np.ascontiguousarray(result[:, 0]), result[:, 2]
+        if self.count == 1:
+            flat = (self.gain[:, 0], self.variance[:, 0, 0], self.row[:, 0], innovation[:, 0], force[:, 0])
+            return smoothed_force(*self._one_axis(), *(np.ascontiguousarray(each) for each in flat))[:, None]
+        place = np.minimum(np.arange(result.shape[0]), self.gain.shape[0] - 1)
+        weighed = np.einsum("nij,nj->ni", np.linalg.inv(self.variance)[place], innovation)
+        return coupled_smoothed(*self._axes(), self.gain, self.row, np.ascontiguousarray(weighed), force)
 
     def lag_weights(self, lag: int, at: int | None = None) -> FloatArray:
-        """Return what each later innovation adds to the estimate of a sample, shape (lag,) [N/m].
+        """Return what each later innovation adds to the forces of a sample, shape (lag, c, c) [N/m]: later sample, force, innovation.
 
         Parameters
         ----------
@@ -121,13 +109,11 @@ class KalmanFilter:
         at : int, optional
             Number of the sample in the settling phase; by default one of the steady state.
         """
-        at = self.gain.shape[0] - 1 if at is None else min(at, self.gain.shape[0] - 1)
-        modes, result = -np.array(self.row[at]), np.empty((lag, 3))
-        kalman_steps(*self._arrays(), self.gain, at + 1, np.zeros(lag), modes, result)
-        return result[:, 2] / self.variance[np.minimum(at + 1 + np.arange(lag), self.gain.shape[0] - 1)]
+        shown, inverse = self._ahead(lag, at)
+        return shown @ inverse
 
     def standard_deviation(self, count: int, smoothed: bool = False, longest: int = 4096) -> FloatArray:
-        """Return the force's standard deviation at `count` samples from the first, given those before or all, shape (count,) [N].
+        """Return the forces' standard deviations at `count` samples from the first, given those before or all, shape (count, c) [N].
 
         Parameters
         ----------
@@ -137,21 +123,18 @@ class KalmanFilter:
         longest : int
             How far a sample looks ahead.
         """
-        place = np.minimum(np.arange(count), self.gain.shape[0] - 1)
-        variance = self.force_variance[place]
+        last = self.gain.shape[0] - 1
+        variance = self.force_variance[np.minimum(np.arange(count), last)]
         if smoothed:
-            steady = self.lag_weights(min(longest, count)) ** 2 * self.variance[-1]
-            told = np.concatenate([[0.0], np.cumsum(steady)])
-            gained = told[np.minimum(np.arange(count)[::-1], told.size - 1)]
-            for k in range(min(self.gain.shape[0] - 1, count)):
-                ahead = min(longest, count - 1 - k)
-                later = np.minimum(k + 1 + np.arange(ahead), self.gain.shape[0] - 1)
-                gained[k] = np.sum(self.lag_weights(ahead, k) ** 2 * self.variance[later])
+            told = np.concatenate([np.zeros((1, self.count)), np.cumsum(self._told(min(longest, count)), axis=0)])
+            gained = told[np.minimum(np.arange(count)[::-1], told.shape[0] - 1)]
+            for k in range(min(last, count)):
+                gained[k] = np.sum(self._told(min(longest, count - 1 - k), k), axis=0)
             variance = variance - gained
         return np.sqrt(np.maximum(variance, 0.0))
 
     def response(self, omega: FloatArray, lag: int = 0) -> tuple[ComplexArray, ComplexArray]:
-        """Return the observer's frequency response in the steady state, measured displacement to force, shape (n,) [N/m].
+        """Return the observer's frequency response in the steady state, measured displacements to forces, shape (n, c, c) [N/m].
 
         Parameters
         ----------
@@ -161,47 +144,84 @@ class KalmanFilter:
 
         Returns
         -------
-        complex arrays, shape (n,)
-            Displacement to force, displacement to innovation.
+        complex arrays, shape (n, c, c)
+            Displacements to forces [N/m], displacements to innovations [-].
         """
-        a, seen, row, gain = self._steady()
-        back = np.exp(-1j * np.asarray(omega, dtype=float) * self.model.step)
-        closed = a - np.outer(gain, seen @ a)
-        states = np.linalg.solve(np.eye(row.size) - back[:, None, None] * closed, np.broadcast_to(gain[:, None], (back.size, row.size, 1)))
-        force = states[:, :, 0] @ row
-        innovation = 1.0 - back * (states[:, :, 0] @ (seen @ a))
+        a, seen, rows, gain = self._steady()
+        # triangular, so that each frequency costs a substitution: a solution each takes seconds and hundreds of megabytes
+        balanced, (scale, _) = scipy.linalg.matrix_balance(a - gain @ seen @ a, permute=False, separate=True)
+        triangle, basis = scipy.linalg.schur(balanced, output="complex")
+        entering, leaving = basis.conj().T @ (gain / scale[:, None]), scale[:, None] * basis
+        turn = np.asarray(omega, dtype=float)[:, None] * self.model.step
+        back = np.exp(-1j * turn)
+        states = np.empty((len(entering), turn.size, self.count), dtype=complex)
+        for k in range(len(entering) - 1, -1, -1):
+            later = np.tensordot(triangle[k, k + 1 :], states[k + 1 :], axes=1)
+            states[k] = (entering[k] + back * later) / (1.0 - back * triangle[k, k])
+        force = np.tensordot(rows @ leaving, states, axes=1).transpose(1, 0, 2)
+        innovation = np.eye(self.count) - back[:, :, None] * np.tensordot(seen @ a @ leaving, states, axes=1).transpose(1, 0, 2)
         if lag:
-            ahead = back[:, None] ** -np.arange(1.0, lag + 1.0)
-            force = force + innovation * (ahead @ self.lag_weights(lag))
+            ahead = np.exp(1j * turn * np.arange(1.0, lag + 1.0))
+            force = force + np.tensordot(ahead, self.lag_weights(lag), axes=1) @ innovation
         return force, innovation
 
     def state_space(self) -> StateSpace:
-        """Return the filter in the steady state: measured displacement [m] in, force [N] and innovation [m] out.
+        """Return the filter in the steady state: measured displacements [m] in, forces [N] and then innovations [m] out.
 
         Its poles are those of the estimate's error.
         """
-        a, seen, row, gain = self._steady()
-        closed = a - np.outer(gain, seen @ a)
-        outputs = np.stack([row @ closed, -(seen @ a)])
-        return StateSpace(closed, gain[:, None], outputs, np.array([[row @ gain], [1.0]]), self.model.step)
+        a, seen, rows, gain = self._steady()
+        closed = a - gain @ seen @ a
+        outputs, direct = np.vstack([rows @ closed, -(seen @ a)]), np.vstack([rows @ gain, np.eye(self.count)])
+        return StateSpace(closed, gain, outputs, direct, self.model.step)
 
     def loop(self) -> StateSpace:
-        """Return the innovation loop, cut open: innovation [m] in, the displacement predicted from past corrections [m] out.
+        """Return the innovation loop, cut open: innovations [m] in, the displacements predicted from past corrections [m] out.
 
-        L(z) = H (z I - A)^-1 A K; the innovation is S = 1 / (1 + L) times the measured displacement.
+        L(z) = H (z I - A)^-1 A K; the innovations are S = (1 + L)^-1 times the measured displacements.
         """
         a, seen, _, gain = self._steady()
-        return StateSpace(a, (a @ gain)[:, None], seen[None], np.zeros((1, 1)), self.model.step)
+        return StateSpace(a, a @ gain, seen, np.zeros((self.count, self.count)), self.model.step)
+
+    def _scan(self, state: FilterState, gain: FloatArray, first: int, measured: FloatArray) -> tuple[FilterState, FloatArray]:
+        modes, result = np.array(state.modes), np.empty((measured.shape[0], 3, self.count))
+        if self.count == 1:
+            kalman_steps(*self._one_axis(), gain[:, 0], first, measured[:, 0], modes, result[:, :, 0])
+        else:
+            coupled_steps(*self._axes(), gain, first, measured, modes, result)
+        return FilterState(state.count + measured.shape[0], modes), result
+
+    def _ahead(self, lag: int, at: int | None) -> tuple[FloatArray, FloatArray]:
+        """How later innovations covary with the forces of a sample [m N], and the inverses of their covariances; (lag, c, c) each."""
+        last = self.gain.shape[0] - 1
+        at = last if at is None else min(at, last)
+        shown = np.empty((lag, self.count, self.count))
+        for f in range(self.count):
+            state = FilterState(0, -np.array(self.row[at, f]))
+            shown[:, f] = self._scan(state, self.gain, at + 1, np.zeros((lag, self.count)))[1][:, 2]
+        return shown, np.linalg.inv(self.variance)[np.minimum(at + 1 + np.arange(lag), last)]
+
+    def _told(self, lag: int, at: int | None = None) -> FloatArray:
+        """By how much each later innovation lessens the variance of each force of a sample, shape (lag, c) [N^2]."""
+        shown, inverse = self._ahead(lag, at)
+        return np.sum((shown @ inverse) * shown, axis=2)
 
     def _steady(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """A, H, the force's row and the gain of the live real states, in metres and newtons."""
-        a, seen, row, _ = self.model.matrices()
-        return a, seen * self.model.noise, row, self.gain[-1].T.ravel()[self.model.live]
+        """A, H, the forces' rows and the gains (n, c) of the live real states, in metres and newtons."""
+        a, seen, rows, _ = self.model.matrices()
+        gain = self.gain[-1].transpose(2, 1, 0).reshape(-1, self.count)[self.model.live]
+        return a, seen * self.model.noise[:, None], rows, gain
 
-    def _arrays(self) -> tuple[FloatArray, FloatArray, int, int, float]:
+    def _axes(self) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray, FloatArray]:
         model = self.model
-        decay = np.stack([model.decay.real, model.decay.imag])
-        return decay, np.stack([model.observed.real, -model.observed.imag]), *model.counts, model.through
+        decay, inputs = (np.stack([each.real, each.imag]) for each in (model.decay, model.inputs.T))
+        observed = np.stack([model.observed.real, -model.observed.imag], axis=1)
+        return decay, np.ascontiguousarray(inputs.transpose(1, 0, 2)), observed, np.array(model.ends), model.through
+
+    def _one_axis(self) -> tuple[FloatArray, FloatArray, int, int, float]:
+        decay, (observed,), (plants, end) = self.model.decay, self.model.observed, self.model.ends
+        parts = np.stack([decay.real, decay.imag]), np.stack([observed.real, -observed.imag])
+        return *parts, plants, end - plants, float(self.model.through[0, 0])
 
 
 def kalman_filter(model: AugmentedModel, longest_settling: int = LONGEST_SETTLING) -> KalmanFilter:
@@ -216,26 +236,26 @@ def kalman_filter(model: AugmentedModel, longest_settling: int = LONGEST_SETTLIN
     Raises
     ------
     InputError
-        If the Riccati equation has no stabilising solution: a force mode that the measurement does not show.
+        If the Riccati equation has no stabilising solution: a force mode that no measurement shows.
     """
-    a, seen, row, q = model.matrices()
+    a, seen, rows, q = model.matrices()
     steady = riccati(a, seen, q)
-    live, places = model.live, model.decay.size
-    parts = [*_settling(model, steady, longest_settling), _corrected(steady, seen)]
+    gain, variance, covariance = _corrected(steady, seen)
+    parts = [*_settling(model, steady, longest_settling), (gain, variance, covariance @ rows.T)]
+    live, places, count = model.live, model.decay.size, model.noise.size
 
-    def spread(vectors: list[FloatArray]) -> FloatArray:
-        full = np.zeros((len(vectors), 2 * places))
-        full[:, live] = vectors
-        return frozen(full.reshape(-1, places, 2).transpose(0, 2, 1))
+    def spread(columns: list[FloatArray]) -> FloatArray:
+        full = np.zeros((len(columns), count, 2 * places))
+        full[:, :, live] = np.transpose(columns, (0, 2, 1))
+        return frozen(full.reshape(-1, count, places, 2).transpose(0, 1, 3, 2))
 
-    gain, variance, covariance = [p[0] for p in parts], [p[1] for p in parts], [p[2] for p in parts]
-    rows = [p @ row for p in covariance]
+    across = [each for _, _, each in parts]
     return KalmanFilter(
         model,
-        gain=spread([g / model.noise for g in gain]),
-        variance=frozen(np.array(variance) * model.noise**2),
-        row=spread(rows),
-        force_variance=frozen([row @ r for r in rows]),
+        gain=spread([gain / model.noise for gain, _, _ in parts]),
+        variance=frozen(np.array([variance for _, variance, _ in parts]) * np.outer(model.noise, model.noise)),
+        row=spread(across),
+        force_variance=frozen([np.einsum("fn,nf->f", rows, each) for each in across]),
     )
 
 
@@ -248,11 +268,11 @@ def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
     Parameters
     ----------
     a, q : arrays, shape (n, n)
-    seen : array, shape (n,) or (p, n)
+    seen : array, shape (p, n)
     """
     size = 1.0 / np.maximum(np.sqrt(np.diag(q)), 1e-3 * np.sqrt(np.max(np.diag(q))))
     # in units of what each state gains in a step, so that none is lost beside another
-    rows = np.atleast_2d(seen) / size
+    rows = seen / size
     transition, known, covariance = (a * size[:, None] / size).T, rows.T @ rows, q * np.outer(size, size)
     for _ in range(60):
         through = np.linalg.solve(np.eye(size.size) + known @ covariance, np.hstack([transition, known]))
@@ -266,31 +286,32 @@ def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
             break
         if change <= 1e-14 * np.linalg.norm(covariance):
             return covariance / np.outer(size, size)
-    raise InputError("force model", "no steady Kalman gain", "modes that are observable in the displacement, each driven by noise")
+    raise InputError("force model", "no steady Kalman gain", "modes that are observable in the displacements, each driven by noise")
 
 
-def _corrected(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, FloatArray]:
-    """Gain, innovation variance and covariance after the correction, in units of the measurement's noise."""
-    variance = float(seen @ predicted @ seen) + 1.0
-    gain = predicted @ seen / variance
-    keep = np.eye(seen.size) - np.outer(gain, seen)
-    return gain, variance, keep @ predicted @ keep.T + np.outer(gain, gain)
+def _corrected(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gains (n, c), innovation covariance and covariance after the correction, in units of the measurements' noise."""
+    shown = predicted @ seen.T
+    variance = seen @ shown + np.eye(len(seen))
+    gain = np.linalg.solve(variance, shown.T).T
+    keep = np.eye(len(predicted)) - gain @ seen
+    return gain, variance, keep @ predicted @ keep.T + gain @ gain.T
 
 
-def _settling(model: AugmentedModel, steady: FloatArray, longest: int) -> list[tuple[FloatArray, float, FloatArray]]:
-    """The first steps' gains, innovation variances and covariances, from filterpy's filter with its full covariance."""
+def _settling(model: AugmentedModel, steady: FloatArray, longest: int) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """The first steps' gains, innovation covariances and the forces' covariance with the states, from filterpy's full covariance."""
     from filterpy.kalman import KalmanFilter as FullFilter
 
-    a, seen, _, q = model.matrices()
+    a, seen, rows, q = model.matrices()
     target = _corrected(steady, seen)[0]
-    full = FullFilter(dim_x=a.shape[0], dim_z=1)
-    full.F, full.H, full.Q, full.R, full.P = a, seen[None], q, np.eye(1), model.first_covariance()
-    found = []
+    full = FullFilter(dim_x=a.shape[0], dim_z=len(seen))
+    full.F, full.H, full.Q, full.R, full.P = a, seen, q, np.eye(len(seen)), model.first_covariance()
+    found, none = [], np.zeros(len(seen))
     for _ in range(longest):
         full.predict()
-        full.update(0.0)
-        gain = full.K[:, 0].copy()
+        full.update(none)
+        gain = full.K.copy()
         if np.linalg.norm(gain - target) <= SETTLED * np.linalg.norm(target):
             break
-        found.append((gain, float(full.S[0, 0]), full.P.copy()))
+        found.append((gain, full.S.copy(), full.P @ rows.T))
     return found

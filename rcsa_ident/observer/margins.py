@@ -68,10 +68,12 @@ def loop_margins(loop: StateSpace) -> ObserverMargins:
     Raises
     ------
     InputError
-        If the closed loop is not stable.
+        If there are more of them, or the closed loop is not stable.
     """
     import control
 
+    if loop.D.size != 1:
+        raise InputError("loop", f"{loop.D.shape[0]} measurements that feel each other", "the loop of one axis")
     closed = np.abs(np.linalg.eigvals(loop.A - loop.B @ np.linalg.solve(1.0 + loop.D, loop.C)))
     if not np.all(closed < 1.0):
         raise InputError("loop", f"a pole of magnitude {closed.max():.6g} when closed", "a loop that is stable when closed")

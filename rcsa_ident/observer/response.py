@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.errors import InputError
-from rcsa_ident.observer.force import AxisObserver, ForceObserver
+from rcsa_ident.observer.force import ForceObserver
 
 #: Deviation of the compensated response [dB] that a usable band allows.
 FLAT = 1.0
@@ -90,39 +88,6 @@ def decibel(values: ComplexArray) -> FloatArray:
 
 
 def observer_response(
-    observer: AxisObserver,
-    omega: FloatArray,
-    machine: ComplexArray,
-    line: Sequence[float] | FloatArray = (),
-    machine_at_line: Sequence[complex] | ComplexArray = (),
-    smoothed: bool = False,
-) -> ObserverFRF:
-    """Return the observer's frequency response and its product with the machine's.
-
-    Parameters
-    ----------
-    observer : AxisObserver
-    omega : array, shape (n,) [rad/s]
-    machine : complex array, shape (n,) [m/N]
-        Response from tip force to the flange's displacement as the sensor shows it: the true one where it is known, else the identified.
-    line, machine_at_line : arrays, shape (j,) [rad/s], [m/N]
-        Frequencies of the force's lines, and the machine's response there.
-    smoothed : bool
-        The estimate given all samples, instead of those before.
-    """
-    if observer.kalman is None:
-        raise InputError("observer", f"{observer.axis.upper()}, which feels the other axis", "`coupled_response`: both axes at once")
-    line = frozen(line)
-    lag = _FAR if smoothed else 0
-    values = [
-        (observer.kalman.response(w, lag)[0] * observer.gap_filter.response(w), np.asarray(h))
-        for w, h in ((np.asarray(omega, dtype=float), machine), (line, machine_at_line))
-    ]
-    (own, there), (own_line, there_line) = values
-    return ObserverFRF(frozen(omega), own, own * there, line, own_line * there_line)
-
-
-def coupled_response(
     observer: ForceObserver,
     omega: FloatArray,
     machine: ComplexArray,
@@ -130,31 +95,32 @@ def coupled_response(
     machine_at_line: ComplexArray,
     smoothed: bool = False,
 ) -> tuple[ObserverFRF, ...]:
-    """Return the responses of an observer whose axes feel each other, and their products with the machine's, an axis each.
+    """Return the observer's frequency responses and their products with the machine's, an axis each.
 
-    Each is the estimate of a force over that force, the other one being none: what the observer takes of one for the other is not in it.
+    Each is the estimate of a force over that force, the others being none: what the observer takes of one for another is not in it.
 
     Parameters
     ----------
     observer : ForceObserver
-        With one filter for all axes.
     omega : array, shape (n,) [rad/s]
-    machine : complex array, shape (n, c, c) [m/N]
-        Response from tip forces (columns) to the flange's displacements as the sensors show them.
-    line, machine_at_line : arrays, shape (j,) [rad/s], (j, c, c) [m/N]
+    machine : complex array, shape (n, a, a) [m/N]
+        Response from tip forces (columns) to the flange's displacements as the sensors show them: the true one where it is known,
+        else the identified.
+    line, machine_at_line : arrays, shape (j,) [rad/s], (j, a, a) [m/N]
         Frequencies of the force's lines, and the machine's response there.
     smoothed : bool
         The estimate given all samples, instead of those before.
     """
-    together = observer.together
-    if together is None:
-        raise InputError("observer", "a filter for each axis", "`observer_response`: an axis at a time")
-    lag = _FAR if smoothed else 0
-
-    def own(w: FloatArray, there: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        passed = np.stack([each.gap_filter.response(w) for each in observer.axes], axis=1)
-        found = together.response(w, lag) * passed[:, None, :]
-        return np.diagonal(found, axis1=1, axis2=2), np.diagonal(found @ there, axis1=1, axis2=2)
-
-    (found, compensated), (_, at_line) = own(np.asarray(omega, dtype=float), machine), own(np.asarray(line, dtype=float), machine_at_line)
-    return tuple(ObserverFRF(frozen(omega), found[:, i], compensated[:, i], frozen(line), at_line[:, i]) for i in range(len(observer.axes)))
+    omega, line = np.asarray(omega, dtype=float), np.asarray(line, dtype=float)
+    passed = [np.stack([each.gap_filter.response(w) for each in observer.axes], axis=1) for w in (omega, line)]
+    responses: list[ObserverFRF] = []
+    for kalman, group in zip(observer.filters, observer.groups, strict=True):
+        own, own_line = (
+            kalman.response(w, _FAR if smoothed else 0)[0] * through[:, None, group]
+            for w, through in zip((omega, line), passed, strict=True)
+        )
+        there, there_line = own @ machine[:, group, group], own_line @ machine_at_line[:, group, group]
+        responses += (
+            ObserverFRF(frozen(omega), own[:, i, i], there[:, i, i], frozen(line), there_line[:, i, i]) for i in range(kalman.count)
+        )
+    return tuple(responses)

@@ -55,10 +55,13 @@ class SampledModes:
         pairs = self.gain / (z - self.decay) + self.gain.conj() / (z - self.decay.conj())
         return np.sum(pairs, axis=1) + self.through
 
+    def pole_residue(self) -> PoleResidue:
+        """Return the filter as poles in the z-plane and their residues."""
+        return PoleResidue(self.decay, self.gain[None], np.ones((self.decay.size, 1)), np.array([[self.through]]))
+
     def state_space(self) -> StateSpace:
         """Return the filter as a real state space in modal form."""
-        poles = PoleResidue(self.decay, self.gain[None], np.ones((self.decay.size, 1)), np.array([[self.through]]))
-        return replace(poles.state_space(), step=self.step)
+        return replace(self.pole_residue().state_space(), step=self.step)
 
     def init(self) -> FloatArray:
         """Return the state of a filter at rest, shape (2, m)."""

@@ -41,9 +41,7 @@ from rcsa_ident.machine.robot.kinematics import posed
 from rcsa_ident.machine.robot.model import Body, Frame, Joint, RobotModel
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.turning_machine import TurningMachine
-from rcsa_ident.observer.coupled_filter import coupled_filter
-from rcsa_ident.observer.coupled_model import AxisNoise, coupled_model
-from rcsa_ident.observer.force_model import RandomWalk, augmented
+from rcsa_ident.observer.force_model import AxisNoise, RandomWalk, augmented
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.transfer_function import SampledModes
 from rcsa_ident.signals.frf import AxisLines
@@ -206,14 +204,12 @@ def _lobes_in_time() -> None:
 
 def _observer() -> None:
     plant = SampledModes(np.array([0.9 + 0.2j]), np.array([1e-8 + 0.0j]), 0.0, 1e-4)
-    kalman = kalman_filter(augmented(plant, RandomWalk(10.0, 100.0), 1e-8), 2)
     measured = plant.run(plant.init(), np.zeros(8))[1]
-    kalman.smooth(kalman.run(kalman.init(), measured)[1])
-    kalman.run_lagged(kalman.init(), measured, kalman.lag_weights(2))
-    # and of axes that feel each other
+    # an axis alone, and two that feel each other
     both = PoleResidue(plant.decay, np.array([[1e-8], [1e-9]]) + 0.0j, np.array([[1.0 + 0.0j, 0.1 + 0.0j]]), np.zeros((2, 2)))
-    coupled = coupled_filter(coupled_model(both, [AxisNoise(RandomWalk(10.0, 100.0), 1e-8)] * 2, 1e-4), 2)
-    coupled.smooth(coupled.run(coupled.init(), np.stack([measured, measured], axis=1))[1])
+    for poles, axes in ((plant.pole_residue(), 1), (both, 2)):
+        kalman = kalman_filter(augmented(poles, [AxisNoise(RandomWalk(10.0, 100.0), 1e-8)] * axes, 1e-4), 2)
+        kalman.smooth(kalman.run(kalman.init(), np.stack([measured] * axes, axis=1))[1])
 
 
 def _virtual_machine() -> None:

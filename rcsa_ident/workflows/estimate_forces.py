@@ -15,11 +15,11 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.machine.machine import Machine
-from rcsa_ident.observer.coupled_model import coupled_transfer
+from rcsa_ident.observer.coupled_transfer import coupled_transfer
 from rcsa_ident.observer.design import AxisSettings, axis_observer, coupled_observer
 from rcsa_ident.observer.force import ForceEstimate, ForceObserver, RunOut, force_observer
 from rcsa_ident.observer.force_model import ForceModel
-from rcsa_ident.observer.response import ObserverFRF, coupled_response, observer_response
+from rcsa_ident.observer.response import ObserverFRF, observer_response
 from rcsa_ident.observer.transfer_function import HIGHEST, TransferFunction, transfer_function
 from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
 from rcsa_ident.observer.wear import WearIndicators, wear_indicators
@@ -185,27 +185,26 @@ def observe(
     together = _feel_each_other(here, axes)
     if not together:
         _unseen(here, coupled, axes, omega, band, notes)
-    groups = [axes] if together else [(axis,) for axis in axes]
-    cross = [_cross(coupled, group) for group in groups]
-    shown = [np.stack([_gap_response(cut, axis, omega) for axis in group], axis=1) for group in groups]
+    cross = _cross(coupled, axes)
+    shown = np.stack([_gap_response(cut, axis, omega) for axis in axes], axis=1)
 
     def settings(transfer: TransferFunction, i: int) -> AxisSettings:
         force = method.force_model(tuning[axes[i]], transfer, speed, teeth)
         return _settings(steady, axes[i], i, omega, force, tuning[axes[i]].noise_floor, method, speed, run_out)
 
     if together:
-        both = coupled_transfer(omega, cross[0], 1.0 / cut.rate, band, shown[0])
+        both = coupled_transfer(omega, cross, 1.0 / cut.rate, band, shown)
         observer = coupled_observer([settings(both.direct(i), i) for i in range(len(axes))], both)
     else:
-        single = [transfer_function(omega, c[:, 0, 0], 1.0 / cut.rate, band, s[:, 0]) for c, s in zip(cross, shown, strict=True)]
+        single = [transfer_function(omega, cross[:, i, i], 1.0 / cut.rate, band, shown[:, i]) for i in range(len(axes))]
         observer = force_observer([axis_observer(settings(transfer, i), transfer) for i, transfer in enumerate(single)])
     whole = observer.observe(*_signals(cut, axes), smooth=smooth)
     estimate = whole.after(min(observer.settling, whole.force.shape[0] // 2))
     if not method.colours_noise:
         estimate = replace(estimate, force=_above(estimate.force, band[0], estimate.step))
     errors: dict[Dof, float] = {}
-    for group in groups:
-        errors |= _model_error(here, group, behind, assembly, estimate, band, speed)
+    for group in observer.groups:
+        errors |= _model_error(here, axes[group], behind, assembly, estimate, band, speed)
     response = _responses(observer, omega, cross, cut, speed, smooth)
     return MonitoredCut(
         _widened(estimate, [errors[axis] for axis in axes]),
@@ -355,30 +354,20 @@ def _settings(
 
 
 def _responses(
-    observer: ForceObserver, omega: FloatArray, cross: list[ComplexArray], recording: Recording, speed: float, smooth: bool
+    observer: ForceObserver, omega: FloatArray, cross: ComplexArray, recording: Recording, speed: float, smooth: bool
 ) -> dict[Dof, ObserverFRF]:
-    """The observer's responses, compensated with the identified machine; `cross` is C31 of the axes that share a filter."""
-    lines = harmonics(speed, 1, observer.axes[0].transfer.band)
+    """The observer's responses, compensated with the identified machine's C31."""
+    axes, lines = [each.axis for each in observer.axes], harmonics(speed, 1, observer.axes[0].transfer.band)
 
-    def seen(values: ComplexArray, axes: Sequence[Dof], w: FloatArray) -> ComplexArray:
+    def seen(values: ComplexArray, w: FloatArray) -> ComplexArray:
         return values * np.stack([_gap_response(recording, axis, w) for axis in axes], axis=1)[:, :, None]
 
-    def at_lines(values: ComplexArray) -> ComplexArray:
-        found = np.empty((lines.size, *values.shape[1:]), dtype=complex)
-        for place in np.ndindex(values.shape[1:]):
-            one = values[:, *place]
-            found[:, *place] = np.interp(lines, omega, one.real) + 1j * np.interp(lines, omega, one.imag)
-        return found
-
-    axes = [each.axis for each in observer.axes]
-    if observer.together is not None:
-        machine, machine_at_line = seen(cross[0], axes, omega), seen(at_lines(cross[0]), axes, lines)
-        return dict(zip(axes, coupled_response(observer, omega, machine, lines, machine_at_line, smooth), strict=True))
-    found = {}
-    for each, values in zip(observer.axes, cross, strict=True):
-        machine, machine_at_line = seen(values, [each.axis], omega), seen(at_lines(values), [each.axis], lines)
-        found[each.axis] = observer_response(each, omega, machine[:, 0, 0], lines, machine_at_line[:, 0, 0], smoothed=smooth)
-    return found
+    at_lines = np.empty((lines.size, *cross.shape[1:]), dtype=complex)
+    for place in np.ndindex(cross.shape[1:]):
+        one = cross[:, *place]
+        at_lines[:, *place] = np.interp(lines, omega, one.real) + 1j * np.interp(lines, omega, one.imag)
+    found = observer_response(observer, omega, seen(cross, omega), lines, seen(at_lines, lines), smooth)
+    return dict(zip(axes, found, strict=True))
 
 
 def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, FloatArray | None]:

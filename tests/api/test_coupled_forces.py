@@ -56,7 +56,7 @@ def test_a_replayed_stream_is_the_record():
     question = StreamQuestion(cut.rate, CASE.spindle_speed, cut.sensors, ("Y", "X"), "cut", "resonators")
     raw, ready = design_replay(MACHINE, TOOL, question, records)
     plan = pickle.loads(raw)
-    assert plan.observer.observer.together is not None
+    assert len(plan.observer.observer.filters) == 1
     state, found = plan.observer.init(), []
     for part in np.split(cut.samples, [700, 3000]):
         state, block = plan.observer.run(state, *plan.signals(part))

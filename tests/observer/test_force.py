@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer.force import RunOut, force_observer, restore_mean_force
+from rcsa_ident.observer.force import ForceObserver, RunOut, restore_mean_force
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.tuning import PaperWalk, Resonators, Tuning, harmonics
 from rcsa_ident.workflows.estimate_forces import observe
@@ -40,6 +40,10 @@ def walking():
 def signals():
     samples = paper_cut().cut.samples
     return samples[:, :2], samples[:, 2:4]
+
+
+def without_run_out(observer):
+    return replace(observer, axes=tuple(replace(each, run_out=None) for each in observer.axes))
 
 
 def error(found, lag=0.0):
@@ -74,7 +78,7 @@ def test_bands_hold_the_error(oscillating):
     scatter = error(oscillating) * np.std(made.force, axis=0)
     assert np.all(scatter < 1.2 * told)
     assert np.all(told < 0.15 * np.std(made.force, axis=0))
-    assert np.all(told < 0.02 * np.array([each.kalman.standard_deviation(1)[0] for each in oscillating.observer.axes]))
+    assert np.all(told < 0.02 * np.array([each.standard_deviation(1)[0, 0] for each in oscillating.observer.filters]))
 
 
 @pytest.mark.slow
@@ -95,7 +99,7 @@ def test_the_start_dies_out_while_the_observer_settles(oscillating, signals):
 def test_the_settling_time_is_that_of_the_slowest_pole(method):
     """Of python-control's observer, filters and all."""
     observer = monitored(method).observer
-    slowest = max(np.abs(each.to_control().poles()).max() for each in observer.axes)
+    slowest = np.abs(observer.to_control().poles()).max()
     assert slowest**observer.settling < 0.02 < slowest ** (observer.settling - 1) * 1.0001
 
 
@@ -154,7 +158,7 @@ def test_a_constant_in_the_gap_changes_nothing(oscillating, signals):
 
 @pytest.mark.slow
 def test_estimates_are_linear_in_the_signals(oscillating, signals):
-    bare = force_observer([replace(each, run_out=None) for each in oscillating.observer.axes])
+    bare = without_run_out(oscillating.observer)
     gap, acceleration = (part[:2000] for part in signals)
     shaken = np.random.default_rng(1).normal(size=gap.shape) * 1e-7
     for smooth in (False, True):
@@ -168,18 +172,18 @@ def test_estimates_are_linear_in_the_signals(oscillating, signals):
 @pytest.mark.slow
 def test_exported_to_python_control(oscillating, signals):
     """Filters, plant and force model as one sampled state space: it is the observer whose gain is steady from the first sample on."""
-    axis = oscillating.observer.axes[1]
-    axis = replace(axis, run_out=None, kalman=kalman_filter(axis.kalman.model, longest_settling=0))
+    whole = without_run_out(oscillating.observer)
+    alone = ForceObserver(whole.axes[1:], (kalman_filter(whole.filters[1].model, longest_settling=0),))
     gap, acceleration = (each[:, 1] for each in signals)
     gap = gap - gap[0]
-    system = axis.to_control()
-    assert (system.input_labels, system.output_labels) == (["gap", "acceleration"], ["force", "innovation"])
+    system = alone.to_control()
+    assert (system.input_labels, system.output_labels) == (["gap_y", "acceleration_y"], ["force_y", "innovation_y"])
     found = control.forced_response(system, inputs=np.stack([gap, acceleration])).outputs
-    alone = force_observer([axis])
     expected = alone.run(alone.init(), gap[:, None], acceleration[:, None])[1]
     np.testing.assert_allclose(found[0], expected.force[:, 0], atol=1e-7 * np.abs(expected.force).max())
     np.testing.assert_allclose(found[1], expected.innovation[:, 0], atol=1e-7 * np.abs(expected.innovation).max())
-    assert replace(axis, acceleration_filter=None).to_control().input_labels == ["gap"]
+    deaf = replace(alone, axes=(replace(alone.axes[0], acceleration_filter=None),))
+    assert deaf.to_control().input_labels == ["gap_y"]
 
 
 def test_run_out_signal_is_its_lines():
@@ -217,7 +221,7 @@ def test_tuning_does_what_it_says(oscillating):
 @pytest.mark.slow
 def test_oscillators_follow_a_change_within_the_response_time(oscillating, signals):
     """The vibration doubles at once: half a revolution later most of the new force is there."""
-    observer = force_observer([replace(each, run_out=None) for each in oscillating.observer.axes])
+    observer = without_run_out(oscillating.observer)
     gap, acceleration = (part[:6000] - part[:6000].mean(axis=0) for part in signals)
     turned = oscillating.observer.axes[0].run_out.signals(0, 6000, 1.0 / RATE)[0]
     gap = gap - np.stack([turned, oscillating.observer.axes[1].run_out.signals(0, 6000, 1.0 / RATE)[0]], axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.observer._kernels import coupled_smoothed, coupled_steps, kalman_steps, lagged_force, modal_filter, smoothed_force
+from rcsa_ident.observer._kernels import coupled_smoothed, coupled_steps, kalman_steps, modal_filter, smoothed_force
 
 PLANTS, FORCES, NOISES, SAMPLES, SETTLING = 3, 2, 2, 60, 4
 
@@ -74,15 +74,6 @@ def test_smoothed_force(system):
         adjoint = a.T @ (kept.T @ adjoint - seen * result[k, 2] / variance[j])
     found = smoothed_force(*arrays, gain, variance, row, np.ascontiguousarray(result[:, 2]), np.ascontiguousarray(result[:, 0]))
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
-
-
-def test_lagged_force():
-    rng = np.random.default_rng(3)
-    weight, innovation, force = rng.normal(size=5), rng.normal(size=20), rng.normal(size=20)
-    expected = [force[k] + weight @ innovation[k + 1 : k + 6] for k in range(15)]
-    np.testing.assert_allclose(lagged_force(weight, innovation, force), expected, rtol=1e-12)
-    assert lagged_force(weight, innovation[:3], force[:3]).size == 0
-    np.testing.assert_array_equal(lagged_force(weight[:0], innovation, force), force)
 
 
 def test_modal_filter():

@@ -7,12 +7,12 @@ import pytest
 
 from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer.force_model import RandomWalk, TeethResonators, augmented
+from rcsa_ident.observer.force_model import AxisNoise, RandomWalk, TeethResonators
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.margins import loop_margins, observer_margins
 from rcsa_ident.observer.tuning import PaperWalk, Resonators
 from tests.observer.test_force import monitored
-from tests.observer.test_kalman import COMB, PLANT, STEP, WALK, model
+from tests.observer.test_kalman import COMB, PLANT, STEP, WALK, dense, model, one_axis
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.9, 0.6), (0.5, 1.2), (1.0, 0.1)])
@@ -53,7 +53,7 @@ def test_what_the_margins_promise_holds_for_the_poles(force):
     assert all(largest(factor) < 1.0 for factor in inside)
     # the sensitivity is what the filter itself answers, and its peak the largest of it
     omega = np.linspace(1e-3, np.pi, 20_001) / STEP
-    sensitivity = kalman.response(omega)[1]
+    sensitivity = kalman.response(omega)[1][:, 0, 0]
     np.testing.assert_allclose(1.0 / (1.0 + loop.response(omega[::100])[:, 0, 0]), sensitivity[::100], rtol=1e-8)
     assert found.sensitivity_peak == pytest.approx(np.max(np.abs(sensitivity)), rel=1e-3)
     assert found.disk == pytest.approx(1.0 / np.max(np.abs(sensitivity - 0.5)), rel=1e-3)
@@ -66,24 +66,24 @@ def test_what_the_margins_promise_holds_for_the_poles(force):
 @pytest.mark.parametrize("force", [WALK, COMB])
 def test_the_riccati_equation_bounds_the_peak(force):
     """(1 + L)(1 + L*) = (R + H Phi Q Phi* H*) / V: the return difference; where no process noise is seen the peak is sqrt(V / R)."""
-    kalman = kalman_filter(augmented(PLANT, force, 5e-8), longest_settling=0)
-    a, seen, _, q = kalman.model.matrices()
+    kalman = kalman_filter(one_axis(PLANT, AxisNoise(force, 5e-8)), longest_settling=0)
+    a, seen, _, q = dense(kalman.model)
     omega = np.linspace(7.0, np.pi / STEP, 60)
     z = np.exp(1j * omega * STEP)
     through = np.array([np.linalg.solve((each * np.eye(len(a)) - a).T, seen) for each in z])
     noise = np.einsum("ni,ij,nj->n", through, q, through.conj()).real
-    expected = (1.0 + noise) / (kalman.variance[-1] / kalman.model.noise**2)
+    expected = (1.0 + noise) / (kalman.variance[-1, 0, 0] / kalman.model.noise[0] ** 2)
     np.testing.assert_allclose(np.abs(1.0 + kalman.loop().response(omega)[:, 0, 0]) ** 2, expected, rtol=1e-6)
     found = observer_margins(kalman)
-    assert found.sensitivity_peak <= np.sqrt(kalman.variance[-1]) / kalman.model.noise * (1.0 + 1e-9)
+    assert found.sensitivity_peak <= np.sqrt(kalman.variance[-1, 0, 0]) / kalman.model.noise[0] * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("method", "peak"), [(Resonators(), 3.63), (PaperWalk(), 8.89)])
 def test_of_a_whole_observer(method, peak):
     """65 states, half of them oscillators without damping, at 25 600 samples a second; and the published walk, whose peak is the bound."""
-    kalman = monitored(method).observer.axes[0].kalman
-    loop, found, bound = kalman.loop(), observer_margins(kalman), np.sqrt(kalman.variance[-1]) / kalman.model.noise
+    kalman = monitored(method).observer.filters[0]
+    loop, found, bound = kalman.loop(), observer_margins(kalman), np.sqrt(kalman.variance[-1, 0, 0]) / kalman.model.noise[0]
     for factor in (found.gain_decrease, found.gain_increase):
         assert np.max(np.abs(np.linalg.eigvals(loop.A - factor * loop.B @ loop.C))) == pytest.approx(1.0, abs=1e-5)
     assert found.sensitivity_peak == pytest.approx(peak, abs=0.01)

@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.observer.force_model import RandomWalk, augmented
+from rcsa_ident.observer.force_model import AxisNoise, RandomWalk
 from rcsa_ident.observer.kalman import kalman_filter
-from tests.observer.test_kalman import COMB, PLANT, WALK, model
+from tests.observer.test_kalman import COMB, PLANT, WALK, model, one_axis, run
 
 
 @settings(max_examples=10, deadline=None)
@@ -18,8 +18,8 @@ from tests.observer.test_kalman import COMB, PLANT, WALK, model
 def test_a_signal_that_comes_later_is_estimated_later(delay, seed, force):
     kalman = kalman_filter(model(force), longest_settling=0)
     signal = 1e-6 * np.random.default_rng(seed).normal(size=150)
-    now = kalman.run(kalman.init(), signal)[1]
-    later = kalman.run(kalman.init(), np.concatenate([np.zeros(delay), signal]))[1]
+    now = run(kalman, signal)[1]
+    later = run(kalman, np.concatenate([np.zeros(delay), signal]))[1]
     np.testing.assert_array_equal(later[:delay], 0.0)
     np.testing.assert_allclose(later[delay:], now, rtol=0.0, atol=1e-12 * np.abs(now).max())
 
@@ -32,6 +32,6 @@ def test_the_unit_of_force_does_not_matter(unit, seed):
     yielding = replace(PLANT, gain=unit * PLANT.gain, through=unit * PLANT.through)
     found = []
     for plant, walk in ((PLANT, WALK), (yielding, RandomWalk(WALK.intensity / unit, WALK.leak))):
-        kalman = kalman_filter(augmented(plant, walk, 5e-8), longest_settling=0)
-        found.append(kalman.run(kalman.init(), signal)[1][:, 0])
+        kalman = kalman_filter(one_axis(plant, AxisNoise(walk, 5e-8)), longest_settling=0)
+        found.append(run(kalman, signal)[1][:, 0])
     np.testing.assert_allclose(unit * found[1], found[0], rtol=0.0, atol=1e-12 * np.abs(found[0]).max())

@@ -11,8 +11,6 @@ import pytest
 
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
-from rcsa_ident.observer.response import coupled_response, observer_response
 from rcsa_ident.observer.tuning import PaperWalk, Resonators
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe, wear_of
 from rcsa_ident.workflows.stream_forces import live_observer
@@ -44,8 +42,8 @@ def signals(count=None):
 def test_cross_terms_are_worth_many_times_the_error():
     """X feels two and a half times its own force along Y, by 13 % of it."""
     without = watch(measured_flange(cross=False))
-    assert found().observer.together is not None
-    assert without.observer.together is None
+    assert len(found().observer.filters) == 1
+    assert len(without.observer.filters) == 2
     assert np.all(error(found().estimate) < 0.03)
     assert error(without.estimate)[0] > 0.25
     assert error(without.estimate)[1] > 3.0 * error(found().estimate)[1]
@@ -54,7 +52,7 @@ def test_cross_terms_are_worth_many_times_the_error():
 def test_an_oblique_measured_flange_has_them_too():
     """At the cut's speed, though its tool-holder does not turn with it."""
     measured = watch(measured_flange(cross=True))
-    assert measured.observer.together is not None
+    assert len(measured.observer.filters) == 1
     assert np.all(error(measured.estimate) < 0.06)
 
 
@@ -93,7 +91,7 @@ def test_a_stream_follows_the_spindle_and_bridges_what_was_lost():
     gap, acceleration = signals()
     live = live_observer(found(), oblique_cut().cut)
     assert all(each.run_out is None for each in live.observer.axes)
-    assert live.observer.together is found().observer.together
+    assert live.observer.filters is found().observer.filters
     state, first = live.run(live.init(), gap[:5000], acceleration[:5000])
     state = live.bridge(state, 37)
     state, second = live.run(state, gap[5037:], acceleration[5037:])
@@ -110,15 +108,9 @@ def test_compensated_with_the_machine_it_is_flat_at_the_orders():
         assert low < 410.0
         assert high > 4000.0
         assert abs(response.delay_at_lines) * oblique_cut().cut.rate < 0.1
-    together, omega = found().observer.together, 2.0 * np.pi * np.array([390.0, 400.0, 1234.0, 4100.0])
-    assert together is not None
-    solved = together.state_space().response(omega)[:, :2]
-    np.testing.assert_allclose(together.response(omega), solved, atol=1e-7 * np.abs(solved).max())
-    with pytest.raises(InputError, match="both axes at once"):
-        observer_response(found().observer.axes[0], np.ones(1), np.ones(1))
-    alone = replace(found().observer, together=None)
-    with pytest.raises(InputError, match="an axis at a time"):
-        coupled_response(alone, np.ones(1), np.ones((1, 2, 2)), np.ones(1), np.ones((1, 2, 2)))
+    (together,), omega = found().observer.filters, 2.0 * np.pi * np.array([390.0, 400.0, 1234.0, 4100.0])
+    solved = together.state_space().response(omega)
+    np.testing.assert_allclose(np.hstack(together.response(omega)), solved, atol=1e-7 * np.abs(solved).max())
 
 
 @pytest.mark.parametrize("place", [0, 1])
@@ -155,10 +147,9 @@ def test_wear_of_the_paper_case():
 def test_exported_to_python_control():
     """Filters, plant and force models of both axes as one sampled state space, in the steady state."""
     observer = found().observer
-    together = observer.together
-    assert together is not None
+    (together,) = observer.filters
     last = {name: getattr(together, name)[-1:] for name in ("gain", "variance", "row", "force_variance")}
-    steady = replace(observer, axes=tuple(replace(each, run_out=None) for each in observer.axes), together=replace(together, **last))
+    steady = replace(observer, axes=tuple(replace(each, run_out=None) for each in observer.axes), filters=(replace(together, **last),))
     gap, acceleration = signals(1500)
     gap = gap - gap[0]
     system = steady.to_control()
@@ -169,8 +160,6 @@ def test_exported_to_python_control():
     expected = steady.run(steady.init(), gap, acceleration)[1]
     np.testing.assert_allclose(shown[:2].T, expected.force, atol=1e-6 * np.abs(expected.force).max())
     np.testing.assert_allclose(shown[2:].T, expected.innovation, atol=1e-6 * np.abs(expected.innovation).max())
-    with pytest.raises(InputError, match="both axes at once"):
-        observer.axes[0].to_control()
     # axes of their own leave together, too
     apart = watch(measured_flange(cross=False)).observer.to_control()
     assert apart.input_labels == system.input_labels

@@ -135,7 +135,7 @@ def test_in_a_gap_the_oscillators_go_on_whatever_stands_for_the_lost_samples():
     assert np.all(np.std(expected[0].force - whole, axis=0) < 0.1 * np.std(whole, axis=0))
     # and what comes behind the gap shows that the stream's own bridge is of that kind
     confused = replace(state, gap=state.gap + 3e-8 * np.random.default_rng(3).standard_normal(state.gap.shape))
-    after = [observer().bridge(each, count).observer.axes[0].filter.modes for each in (state, confused)]
+    after = [observer().bridge(each, count).observer.filters[0].modes for each in (state, confused)]
     np.testing.assert_array_equal(after[0], after[1])
 
 
@@ -145,7 +145,7 @@ def test_behind_a_long_gap_the_observer_begins_anew():
     state = observer().bridge(run(observer(), samples[:begin])[0], count)
     assert state.count == begin + count
     assert state.gap.shape == (0, 2)
-    np.testing.assert_array_equal(state.observer.axes[0].filter.modes, 0.0)
+    np.testing.assert_array_equal(state.observer.filters[0].modes, 0.0)
     force = np.zeros_like(true)
     force[begin + count :] = run(observer(), samples[begin + count :], state=state)[1]
     assert np.all(errors(force, true, 2.1, 3.0) < 0.06)

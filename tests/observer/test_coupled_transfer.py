@@ -8,10 +8,10 @@ import pytest
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import FitStatus, RationalFit
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer.coupled_filter import coupled_filter
-from rcsa_ident.observer.coupled_model import AxisNoise, CoupledTransfer, coupled_model, coupled_transfer
-from rcsa_ident.observer.force_model import RandomWalk, TeethResonators, augmented
+from rcsa_ident.observer.coupled_transfer import CoupledTransfer, coupled_transfer
+from rcsa_ident.observer.force_model import AxisNoise, RandomWalk, TeethResonators, augmented
 from rcsa_ident.observer.kalman import kalman_filter, riccati
+from rcsa_ident.observer.margins import observer_margins
 from rcsa_ident.observer.transfer_function import SampledModes, high_pass, warped
 
 STEP, BAND = 1.0 / 20000.0, (2.0 * np.pi * 400.0, 2.0 * np.pi * 4000.0)
@@ -45,7 +45,7 @@ def transfer():
 
 @pytest.fixture(scope="module")
 def both(transfer):
-    return coupled_filter(coupled_model(transfer.behind_high_pass(CORNER), noises(), STEP), 60)
+    return kalman_filter(augmented(transfer.behind_high_pass(CORNER), noises(), STEP), 60)
 
 
 @pytest.fixture(scope="module")
@@ -124,23 +124,16 @@ def test_axes_that_feel_nothing_of_each_other_have_their_own_filters(measured):
     """Forces, deviations and smoothed forces of two filters of one axis each."""
     fit, axes = machine(0.0), noises()
     transfer = CoupledTransfer(fit, STEP, BAND, np.zeros(2))
-    together = coupled_filter(coupled_model(transfer.behind_high_pass(CORNER), axes, STEP), 60)
+    together = kalman_filter(augmented(transfer.behind_high_pass(CORNER), axes, STEP), 60)
     _, found = together.run(together.init(), measured)
     smoothed = together.smooth(found)
     for i, each in enumerate(axes):
-        own = kalman_filter(
-            augmented(
-                transfer.direct(i).behind_high_pass(CORNER), each.force, each.noise, acceleration=each.acceleration,
-                acceleration_noise=each.acceleration_noise, disturbance=each.disturbance,
-                disturbance_intensity=each.disturbance_intensity,
-            ),
-            60,
-        )  # fmt: skip
-        _, alone = own.run(own.init(), measured[:, i])
-        np.testing.assert_allclose(found[:, :2, i], alone[:, :2], atol=1e-6 * np.abs(alone[:, 0]).max())
-        np.testing.assert_allclose(smoothed[:, i], own.smooth(alone), atol=1e-6 * np.abs(alone[:, 0]).max())
+        own = kalman_filter(augmented(transfer.direct(i).behind_high_pass(CORNER).pole_residue(), [each], STEP), 60)
+        _, alone = own.run(own.init(), measured[:, i : i + 1])
+        np.testing.assert_allclose(found[:, :2, i], alone[:, :2, 0], atol=1e-6 * np.abs(alone[:, 0]).max())
+        np.testing.assert_allclose(smoothed[:, i], own.smooth(alone)[:, 0], atol=1e-6 * np.abs(alone[:, 0]).max())
         for given in (False, True):
-            expected = own.standard_deviation(300, given, 100)
+            expected = own.standard_deviation(300, given, 100)[:, 0]
             np.testing.assert_allclose(together.standard_deviation(300, given, 100)[:, i], expected, rtol=1e-5)
 
 
@@ -161,27 +154,20 @@ def test_response_and_state_space_are_one(both, measured):
     omega = 2.0 * np.pi * np.array([450.0, 900.0, 2600.0])
     system = both.state_space()
     values = system.response(omega)
-    np.testing.assert_allclose(both.response(omega), values[:, :2], rtol=1e-7)
+    np.testing.assert_allclose(np.hstack(both.response(omega)), values, rtol=1e-7)
     # with all that comes, the estimate of a walk has neither lag nor loss
     there = sampled_response(
         PoleResidue(both.model.decay[:5], both.model.observed[:, :5] / 2.0, both.model.inputs, both.model.through), omega
     )
-    around = both.response(omega, 2000) @ there
-    assert np.max(np.abs(around - np.eye(2))) < np.max(np.abs(both.response(omega) @ there - np.eye(2)))
-
-
-def test_lost_samples_are_predicted(both, measured):
-    state, _ = both.run(both.init(), measured[:100])
-    after, guessed = both.predict(state, 20)
-    a, _, rows, _ = both.model.matrices()
-    x = state.modes.T.ravel()[both.model.live]
-    for k in range(20):
-        x = a @ x
-        np.testing.assert_allclose(guessed[k, 0], rows @ x, rtol=1e-8, atol=1e-10)
-    assert after.count == 120
-    np.testing.assert_array_equal(guessed[:, 2], 0.0)
+    around = both.response(omega, 2000)[0] @ there
+    assert np.max(np.abs(around - np.eye(2))) < np.max(np.abs(both.response(omega)[0] @ there - np.eye(2)))
 
 
 def test_a_measurement_without_noise_is_refused(transfer):
     with pytest.raises(InputError, match="noise"):
-        coupled_model(transfer.behind_high_pass(CORNER), [AxisNoise(FORCES[0], 0.0), AxisNoise(FORCES[1], 1e-9)], STEP)
+        augmented(transfer.behind_high_pass(CORNER), [AxisNoise(FORCES[0], 0.0), AxisNoise(FORCES[1], 1e-9)], STEP)
+
+
+def test_margins_are_those_of_one_axis(both):
+    with pytest.raises(InputError, match="2 measurements that feel each other"):
+        observer_margins(both)
