@@ -76,8 +76,8 @@ export sample-1.json --what modes --to json --out MODES.json --json
 learn {{e}}/MODES.toml {{e}}/TOOLING.toml --tests {{e}}/CUTS.csv {_PROCESS} --method zero-order --out LEARNT.json --json
 cases {{e}}/FLANGE.csv {{e}}/CASES.toml {_PROCESS} --json
 path remove {_POCKET} --out ENGAGEMENT.csv --json
-path stability sample-1.json {_POCKET} {_PROCESS} --out STABILITY.csv --json
-path mill sample-1.json {_POCKET} {_PROCESS} --out MILLED.csv --surface SURFACE.csv --json
+path stability --modes {{e}}/MODES.toml {_POCKET} {_PROCESS} --out STABILITY.csv --json
+path mill --modes {{e}}/MODES.toml {_POCKET} {_PROCESS} --out MILLED.csv --surface SURFACE.csv --json
 ring {{i}}/DRAWN.toml {{i}}/whole.wav --bare-tool {{i}}/tool.wav --mass-g {{{{mass}}}} --out RUNG.toml --json
 tap {{e}}/hits.csv --out TAPPED.csv --json
 listen {{e}}/sound.wav {{e}}/sound.flac --json
