@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.remarks import Remark
 from tests.fixtures import by_hand
 from tests.fixtures.campaign import part_of_the_sample_runs
+from tests.fixtures.kept import kept
 
 
 def run(*arguments, code=0):
@@ -30,11 +33,18 @@ def run(*arguments, code=0):
 
 
 @pytest.fixture(scope="module")
-def first(tmp_path_factory, small_campaign):
+def first(tmp_path_factory):
     """A result of the small campaign, found without a start."""
     path = tmp_path_factory.mktemp("first") / "RESULT.json"
-    run("identify", small_campaign, "--out", path, "--processes", 1)
+    path.write_text(kept(_first), encoding="utf-8")
     return path
+
+
+def _first():
+    with TemporaryDirectory() as scratch:
+        path = Path(scratch) / "RESULT.json"
+        run("identify", part_of_the_sample_runs(Path(scratch) / "small", 4), "--out", path, "--processes", 1)
+        return path.read_text(encoding="utf-8")
 
 
 def without_covariance(data):

@@ -13,6 +13,7 @@ from rcsa_ident.cutting.materials import material
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.virtual.milling import rigid_force_lines
+from tests.fixtures.kept import kept
 from tests.fixtures.virtual_shop import TIP_OMEGA, Shop, open_shop
 
 QUICK = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
@@ -42,6 +43,10 @@ class Rounded(Shop):
 @pytest.fixture(scope="module")
 def errors():
     """Of the tooltip that was never cut, X and Y, by true and believed corner radius."""
+    return kept(_errors)
+
+
+def _errors():
     shop = open_shop(speeds=12)
     known = (shop.machine, shop.toolings, shop.held_out, shop.truth, shop.across)
     true = shop.tip(14000.0 * np.pi / 30.0)

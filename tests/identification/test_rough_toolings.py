@@ -17,6 +17,7 @@ from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.spread import EXACT, Spread
+from tests.fixtures.kept import kept
 from tests.fixtures.virtual_shop import TIP_OMEGA, open_shop
 
 #: What is wrong with the drawings of both toolings, about one and a half of an honest drawing's spreads.
@@ -57,6 +58,10 @@ def test_tool_holders_stand_where_they_are_put(rough, shop):
 @pytest.fixture(scope="module")
 def roughly_drawn():
     """A campaign of toolings that are not as drawn, its answer, and that of who takes the drawings for exact."""
+    return kept(_roughly_drawn)
+
+
+def _roughly_drawn():
     names = iter(TRULY)
     truly = {}
 
