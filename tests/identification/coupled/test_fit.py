@@ -19,6 +19,7 @@ from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
+from tests.fixtures.kept import kept
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, oblique, open_shop
 from tests.identification.coupled.models import coupled_vector
 
@@ -69,26 +70,42 @@ def values(tip):
     return np.array([[tip.between(f"tip.{a}", f"tip.{b}") for b in AXES] for a in AXES]).transpose(2, 0, 1)
 
 
-@pytest.fixture(scope="module")
-def straight():
+def _straight():
     return Campaign(20, lambda spindle: spindle)
 
 
-@pytest.fixture(scope="module")
-def start(straight):
+def _start():
     """Planes apart that searches of other machines begin from, to come to an end sooner."""
-    return {axis: part.posterior for axis, part in straight.found.axes.items()}
+    return {axis: part.posterior for axis, part in kept(_straight).found.axes.items()}
 
 
-@pytest.fixture(scope="module")
-def skewed(start):
+def _skewed():
     # with the noise of seeds 0 and 2 rounding decides whether moments are taken for directions: tips stay right, the words do not
-    return Campaign(12, SKEWED, start=start, noise=1)
+    return Campaign(12, SKEWED, start=_start(), noise=1)
+
+
+def _turning():
+    return Campaign(12, gyroscopic, start=_start())
 
 
 @pytest.fixture(scope="module")
-def turning(start):
-    return Campaign(12, gyroscopic, start=start)
+def straight():
+    return kept(_straight)
+
+
+@pytest.fixture(scope="module")
+def start():
+    return _start()
+
+
+@pytest.fixture(scope="module")
+def skewed():
+    return kept(_skewed)
+
+
+@pytest.fixture(scope="module")
+def turning():
+    return kept(_turning)
 
 
 @pytest.mark.slow
