@@ -22,8 +22,9 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.channels import LARGEST_FILE, RATE, Channel, check_lengths, placed, snapped, the_only, time_scale
 from rcsa_ident.io.files import existing_file, mapped
 from rcsa_ident.io.matlab_elements import COMPLETE, HEADER, NUMBERS, Version5
-from rcsa_ident.io.time_base import Irregular, seconds_per, time_unit
+from rcsa_ident.io.time_base import Irregular, time_unit
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.signals.told_units import seconds_in
 
 #: Variables that hold the rate [Hz] or the interval [s], without signs and capitals.
 _RATES = ("samplingratehz", "fs", "fshz", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "samplingfreq")
@@ -175,7 +176,7 @@ def _plain(name: str) -> str:
 
 def _seconds(name: str) -> float:
     """Seconds per unit of a vector of times, by its name."""
-    return seconds_per(time_unit(name.rpartition(".")[2]) or "") or 1.0
+    return seconds_in(time_unit(name.rpartition(".")[2]) or "s") or 1.0
 
 
 def _rises(tables: Tables, name: str, samples: int) -> bool:

@@ -10,7 +10,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import RATE, notes_of
 from rcsa_ident.io.recordings import READERS, SOUND, read_signals
 from rcsa_ident.io.text_header import name_and_unit
-from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, known_unit, told_table
+from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, told_table
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.told_units import quantity_in
@@ -58,7 +58,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
     if suffix not in _LISTING:
         raise InputError("recording", f"suffix '{suffix}'", f"one of {', '.join(dict.fromkeys([*TEXT, *READERS]))}", str(path))
     told: dict[str, str] = dict(import_module(f"rcsa_ident.io.{_LISTING[suffix]}").told_channels(path))
-    units = {name: name_and_unit(name, known_unit)[1] or unit for name, unit in told.items()}
+    units = {name: name_and_unit(name)[1] or unit for name, unit in told.items()}
     # beside channels of known units there may be others of another length or rate
     wanted = list(names) or [name for name, unit in units.items() if quantity_in(unit)[1] is not None] or list(units)
     if not wanted:

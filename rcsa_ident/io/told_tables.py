@@ -17,11 +17,11 @@ from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.text_columns import LARGEST_TEXT, Meant, decoded
 from rcsa_ident.io.text_header import Head, columns_of, read_head, split, tells_rate, times_of
 from rcsa_ident.io.text_rows import STAMP, beside, first_numbers, lines_of, numbers_of, rows_of
-from rcsa_ident.io.time_base import UNITS_OF_TIME, Irregular, seconds_per, time_unit, uniform
+from rcsa_ident.io.time_base import Irregular, time_unit, uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
-from rcsa_ident.signals.told_units import is_untold, quantity_in, told_unit
+from rcsa_ident.signals.told_units import UNITS_OF_TIME, is_untold, quantity_in, seconds_in
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
 #: Units of times without a unit, which the rate decides; and as a share, rates that agree.
@@ -131,7 +131,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     notes: list[Remark] = []
 
     def meant(header: tuple[str, ...]) -> Meant:
-        own, every = columns_of(header, [""] * len(header), known_unit)
+        own, every = columns_of(header, [""] * len(header))
         places = [_place(name, own, header, str(path)) for name in names]
         units[:] = [every[i] for i in places]
         times = [i for i in times_of(own, every) if i not in places]
@@ -166,7 +166,7 @@ def _place(name: str, names: Sequence[str], texts: Sequence[str], where: str) ->
 def _seconds(name: str, unit: str, notes: list[Remark], where: str) -> float:
     """Seconds per unit of a column of times; one that nothing tells is said, but of a column 'time' in a campaign's table."""
     told = time_unit(name, unit)
-    seconds = seconds_per(told or unit)
+    seconds = seconds_in(told or unit or "s")
     if seconds is None:
         raise InputError(f"unit of column {name}", told or unit, UNITS_OF_TIME, where)
     if not told and not unit and name.lower() != "time":
@@ -192,7 +192,7 @@ def _tells_more(path: Path) -> bool:
     # what a spreadsheet would not take for a table: names in quotes around the delimiter, lines of several lengths
     unlike = len({line.count(delimiter) for line in text.splitlines()[start - 1 : start + 1]}) > 1
     cells = split(head[-1], delimiter) if head else []
-    names, units = columns_of(cells, [""] * len(cells), known_unit)
+    names, units = columns_of(cells, [""] * len(cells))
     return unlike or len(times_of(names, units)) > 1 or any(STAMP.fullmatch(cell) for cell in split(lines[start], delimiter))
 
 
@@ -218,7 +218,7 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
     cycles = [i for i in range(start, len(lines)) if _CYCLE.match(lines[i])]
     rows, width = rows_of(lines[: cycles[0] if cycles else None], start, delimiter)
     comma = comma or (delimiter != "," and any("," in row for row in rows))
-    head = read_head(lines[:start], delimiter, comma, width, wanted, known_unit, default_rate, where)
+    head = read_head(lines[:start], delimiter, comma, width, wanted, default_rate, where)
     values, stamped = numbers_of(rows, delimiter, comma, width, where)
     remarks = [Remark(RecordCode.ASSUMED, _FIRST_CYCLE.format(len(cycles) + 1))] if cycles else []
     if not head.named:
@@ -320,8 +320,3 @@ def _nearly_even(time: FloatArray) -> float | None:
     place = np.arange(time.size)
     step, start = np.polyfit(place, time, 1)
     return float(1.0 / step) if np.abs(time - start - step * place).max() < 0.5 * step else None
-
-
-def known_unit(text: str) -> bool:
-    """Return whether a text is a unit; a number is none."""
-    return told_unit(text) is not None and any(letter.isalpha() for letter in text)

@@ -126,12 +126,12 @@ DIALECTS: dict[str, tuple[str, str, str]] = {
     ),
     "Siglent": (
         "Record Length,Analog:400\nSample Interval,3.90625e-05\nVertical Scale,CH1:0.5\nSource,CH1,CH2\nSecond,Volt,Volt\n" + PLAIN,
-        "Volt V",
-        "Volt V",
+        "Volt Volt",
+        "Volt Volt",
     ),
-    "Rigol": ("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-6.0e-03,3.906250e-05\n" + NUMBERS, "CH1 V", "CH2 V"),
+    "Rigol": ("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-6.0e-03,3.906250e-05\n" + NUMBERS, "CH1 Volt", "CH2 Volt"),
     "Rigol, by one line": ("Time(s),CH1(V),CH2(V),t0 = 0s, tInc = 3.906250e-05,\n" + PLAIN, "CH1 V", "CH2 V"),
-    "Keysight": ("x-axis,1,2\nsecond,Volt,Volt\n" + PLAIN, "1 V", "2 V"),
+    "Keysight": ("x-axis,1,2\nsecond,Volt,Volt\n" + PLAIN, "1 Volt", "2 Volt"),
     "LeCroy": (
         "LECROYWS3024,12345,Waveform\nSegments,1,SegmentSize,400\nSegment,TrigTime,TimeSinceSegment1\n#1,01-Feb-2024 12:00:00,0\n"
         "Time,acc (V),force (V)\n" + PLAIN,
@@ -233,7 +233,7 @@ def test_a_dialect_is_read_to_the_last_digit(tmp_path, name, encoding):
 def sensor(told: str) -> Sensor:
     name, unit = told.rsplit(" ", 1)
     quantity = {"N": Quantity.FORCE, "kN": Quantity.FORCE, "um": Quantity.DISPLACEMENT}.get(unit, Quantity.ACCELERATION)
-    return Sensor(name, quantity, Dof.X, 0.1 if unit in ("V", "mV") else 1.0)
+    return Sensor(name, quantity, Dof.X, 0.1 if unit in ("V", "mV", "Volt") else 1.0)
 
 
 @pytest.mark.parametrize("name", [name for name, (_, *told) in DIALECTS.items() if told[0] != told[1]])
