@@ -232,7 +232,7 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
         time = [0]
         remarks.append(Remark(RecordCode.ASSUMED, f"{head.names[0]}, which rises throughout, was taken as the time [s]"))
     if time:
-        rate, values = _timed(head, values, time[0], bool(stamped), told, remarks, where)
+        rate, values = _timed(head, values, time[0], bool(stamped), told, None if wanted else default_rate, remarks, where)
         _check_one_time(head, values, time[0], where)
     elif told is not None:
         rate = told
@@ -267,9 +267,17 @@ def _steps_of_one(values: FloatArray) -> bool:
 
 
 def _timed(
-    head: Head, values: FloatArray, place: int, stamped: bool, told: float | None, remarks: list[Remark], where: str
+    head: Head,
+    values: FloatArray,
+    place: int,
+    stamped: bool,
+    told: float | None,
+    asked: float | None,
+    remarks: list[Remark],
+    where: str,
 ) -> tuple[float, FloatArray]:
-    """The rate [Hz] that a column of times tells, and the rows at their places; samples that the times skip are NaN."""
+    """The rate [Hz] that a column of times tells, and the rows at their places; samples that the times skip are NaN. Uneven times are left
+    aside for a rate that the user asks for."""
     name, time = head.names[place], values[:, place]
     seconds = 1.0
     if not stamped:
@@ -289,8 +297,13 @@ def _timed(
         rate, index = uniform(time * seconds, told)
     except Irregular as error:
         even = _nearly_even(time * seconds)
+        if even is None and asked is not None:
+            words = f"the times in column {name} are uneven and were left aside: the rate that was told counts, {asked:.6g} Hz"
+            remarks.append(Remark(RecordCode.ASSUMED, words))
+            return asked, values
         if even is None:
-            raise InputError(f"column {name}", error.found, error.allowed, f"{where} row {error.row + 1}") from None
+            allowed = f"{error.allowed}, or for a recording without settings its rate [Hz], told"
+            raise InputError(f"column {name}", error.found, allowed, f"{where} row {error.row + 1}") from None
         rate, index = even, np.arange(values.shape[0])
         words = f"times that stand less than half a sample from their places were taken as even, {rate:.6g} Hz"
         remarks.append(Remark(RecordCode.ASSUMED, words))

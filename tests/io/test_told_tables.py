@@ -98,6 +98,18 @@ def test_what_is_not_told_is_asked_for(tmp_path, text, words):
     assert "cut.csv" in str(caught.value)
 
 
+def test_uneven_times_are_left_aside_for_a_rate_that_is_told(tmp_path):
+    """Devices of a few dollars write when they come to it; a campaign's rate is no word about this file."""
+    path = tmp_path / "tap.csv"
+    path.write_text("time_s,acc (g)\n" + "".join(f"{t},{k % 3}\n" for k, t in enumerate((0.0, 0.003, 0.006, 0.011, 0.0119, 0.02))))
+    opened = open_recording(path, (), 333.0)
+    assert (opened.rate, opened.channels[0].samples.size) == (333.0, 6)
+    assert any("column time_s are uneven and were left aside: the rate that was told counts, 333 Hz" in said for said in opened.remarks)
+    for read in (lambda: open_recording(path), lambda: read_recording(path, (Sensor("acc", Quantity.ACCELERATION, Dof.X),), 333.0)):
+        with pytest.raises(InputError, match="whole multiples of the sampling interval"):
+            read()
+
+
 def test_a_channel_that_stands_still_is_there(tmp_path):
     still = FORCE.copy()
     still[:, 2] = 0.0
