@@ -122,7 +122,7 @@ def read_head(
         A line of names has another number of cells than the numbers below, or a rate is told in a unit that is not known.
     """
     lines = [line.lstrip("# \t" if delimiter != "\t" else "# ") for line in above]
-    rows = [split(line, delimiter) for line in lines if line.strip(" \t;,")]
+    rows = [row for line in lines if any(row := split(line, delimiter))]
     if not delimiter:
         rows = [_joined(row, width) for row in rows]
     labels = [row[0].strip().rstrip(":").lower() for row in rows]

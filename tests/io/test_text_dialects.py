@@ -337,12 +337,21 @@ def test_whole_numbers_in_front_hide_no_decimal_comma(tmp_path):
     assert [each.samples.tolist() for each in open_recording(path).channels] == [[0.0, G, 0.5 * G, 2.0 * G], [1.0, 2.0, 3.0, 4.5]]
 
 
-def test_equal_rows_are_kept_with_a_decimal_comma_as_well(tmp_path):
-    """Found by fuzzing: a row above the table by itself was taken for a header that comes again, and none was left."""
+@pytest.mark.parametrize("gap", ["1,7", ""])
+def test_a_row_with_decimal_commas_above_the_table_is_no_header_that_comes_again(tmp_path, gap):
+    """Found by fuzzing: a row above the table by itself, also one with an empty cell, was taken for a header, and none was left."""
     path = tmp_path / "record.txt"
-    path.write_text("a;b;c\n0,002;1,7;2\nnote\n0,002;1,7;2\n0,002;1,7;2\n0,003;1,8;3\n")
-    found = open_recording(path, default_rate=1000.0)
-    assert [each.samples.tolist() for each in found.channels] == [[0.002, 0.002, 0.003], [1.7, 1.7, 1.8], [2.0, 2.0, 3.0]]
+    path.write_text(f"a;b;c\n0,002;{gap};2\nnote\n0,002;{gap};2\n0,002;{gap};2\n0,003;1,8;3\n")
+    found = {each.name: each.samples for each in open_recording(path, default_rate=1000.0).channels}
+    np.testing.assert_array_equal(found["a"], [0.002, 0.002, 0.003])
+    np.testing.assert_array_equal(found["b"], [1.7, 1.7, 1.8] if gap else [np.nan, np.nan, 1.8])
+    np.testing.assert_array_equal(found["c"], [2.0, 2.0, 3.0])
+
+
+def test_a_line_of_quotes_alone_says_nothing(tmp_path):
+    """Found by fuzzing: between blanks such a line has no cell."""
+    (tmp_path / "record.txt").write_text('"\n1.,\n1\n3\n')
+    assert open_recording(tmp_path / "record.txt", default_rate=1000.0).channels[0].samples.tolist() == [1.0, 1.0, 3.0]
 
 
 def test_empty_cells_are_lost_samples_and_no_row_goes(tmp_path):
