@@ -51,6 +51,7 @@ _OPTIONS = {
     "force": ("force", ""),
     "response": ("response", ""),
     "channel": ("channel", ""),
+    "sensitivity": ("sensitivity", ""),
     "sampling_rate_hz": ("rate_hz", ""),
     "mass": ("mass_g", ""),
     "cell": ("cell_mm", ""),

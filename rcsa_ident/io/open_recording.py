@@ -70,9 +70,10 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
             raise InputError(RATE, "nothing in the file", "the rate [Hz], told", str(path)) from None
         raise
     channels = []
-    for name, signal in zip(wanted, signals, strict=True):
-        factor, quantity = quantity_in(units.get(name, ""))
-        channels.append(OpenChannel(name, units.get(name, ""), quantity, factor * signal[:]))
+    for name, signal, stored in zip(wanted, signals, signals.stored, strict=True):
+        unit = units.get(name) or stored
+        factor, quantity = quantity_in(unit)
+        channels.append(OpenChannel(name, unit, quantity, factor * signal[:]))
     return OpenRecording(rate, tuple(channels))
 
 

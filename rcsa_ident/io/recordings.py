@@ -13,6 +13,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import LARGEST_DATA, Channel, Signals, StoredChannel, notes_of
 from rcsa_ident.io.files import MEGABYTE
+from rcsa_ident.io.text_header import name_and_unit
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.told_units import is_untold, quantity_in, volts_in
@@ -103,8 +104,10 @@ def read_signals(
     suffix: str | None = None,
     cut_off: str = "refuse",
     time: str | None = None,
-) -> tuple[float, Sequence[Channel]]:
+) -> tuple[float, Signals]:
     """Return the sampling rate [Hz] and the named channels as they stand in a file, shape (n,) each; long ones may stay in it.
+
+    Where a format has no place for units, names may tell them, as ``acc (mV)``.
 
     Parameters
     ----------
@@ -138,9 +141,14 @@ def read_signals(
     # what overflows or is no number is a lost sample, see below
     with np.errstate(all="ignore"):
         try:
-            return reader(path, names, default_rate, **options)
+            found, signals = reader(path, names, default_rate, **options)
         except InputError as error:
             raise (error if error.where else error.at(str(path))) from None
+    signals = signals if isinstance(signals, Signals) else Signals(signals)
+    if not signals.units:
+        stored = signals.stored or ("",) * len(names)
+        signals.stored = tuple(unit or name_and_unit(name)[1] for unit, name in zip(stored, names, strict=True))
+    return found, signals
 
 
 class StoredSamples:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io import text_columns
 from rcsa_ident.io.channels import Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
@@ -21,7 +21,7 @@ from rcsa_ident.io.time_base import Irregular, time_unit, uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
-from rcsa_ident.signals.told_units import UNITS_OF_TIME, is_untold, quantity_in, seconds_in
+from rcsa_ident.signals.told_units import UNITS_OF_TIME, is_untold, quantity_in, seconds_in, volts_in
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
 #: Units of times without a unit, which the rate decides; and as a share, rates that agree.
@@ -74,15 +74,23 @@ class OpenRecording:
     lossy: bool = False
 
     def of(
-        self, quantity: Quantity | None = None, names: Sequence[str] = ()
+        self, quantity: Quantity | None = None, names: Sequence[str] = (), sensitivity: float | None = None
     ) -> tuple[Quantity, tuple[OpenChannel, ...], tuple[Remark, ...]]:
         """Return the channels of one quantity, and what was assumed: those that are named, or all of the first quantity of acceleration,
         sound, force and motion.
 
+        Parameters
+        ----------
+        quantity : Quantity or None
+            What channels measure whose unit does not say it.
+        names : sequence of str
+        sensitivity : float or None
+            Signal per SI unit of such channels.
+
         Raises
         ------
         InputError
-            A name is not there, or nothing tells what a channel measures; the message names the option.
+            A name is not there, nothing tells what a channel measures, or its unit asks for the sensitivity; the message names the option.
         """
         present = [each.name for each in self.channels]
         chosen = tuple(self.channels[the_only(name, present, "")] for name in names) or self.channels
@@ -98,12 +106,18 @@ class OpenRecording:
         if not kept:
             found = listed([f"{each.name} [{each.unit}]" for each in chosen])
             raise InputError("quantity", found, f"a channel that measures {quantity}")
-        # lines stay where they are in any unit, amplitudes do not
-        units = tuple(
-            assumed(each.name, each.unit, f"{quantity} [{SI_UNITS[quantity]}]" if is_untold(each.unit) else f"{quantity}, in that unit,")
-            for each in kept
-            if each.quantity is None
-        )
+        unsaid = [each for each in kept if each.quantity is None]
+        if sensitivity is not None:
+            if not unsaid:
+                raise InputError("sensitivity", f"{sensitivity:g}", f"none: channel {kept[0].name} has the unit {kept[0].unit}")
+            gain = positive("sensitivity", sensitivity, "signal per SI unit")
+            return quantity, tuple(replace(each, samples=each.samples / gain) for each in kept), self.remarks
+        for each in unsaid:
+            if not is_untold(each.unit):
+                signal = "V" if volts_in(each.unit) is not None else each.unit
+                found = f"nothing, and channel {each.name} is in {each.unit}"
+                raise InputError("sensitivity", found, f"the sensor's [{signal} per SI unit]")
+        units = tuple(assumed(each.name, "", f"{quantity} [{SI_UNITS[quantity]}]") for each in unsaid)
         return quantity, kept, (*self.remarks, *units)
 
 

@@ -2,8 +2,11 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
+import pyarrow
 import pytest
+from pyarrow import parquet
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
@@ -146,6 +149,26 @@ def test_a_unit_that_nobody_knows_is_the_sensitivitys_business(tmp_path):
     (tmp_path / "cut.csv").write_text(table(unit="pC"))
     recording = read_recording(tmp_path / "cut.csv", with_sensitivity(2.0))
     np.testing.assert_allclose(recording.samples, 0.5 * FORCE[:, :2], rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["name of a MATLAB variable", "name of a column", "field of a column"])
+def test_no_format_takes_an_unknown_unit_as_si(tmp_path, kind):
+    """Formats without a place for units tell them by names; Parquet may by a field's metadata."""
+    name, samples = "a (counts)", np.arange(50) % 7.0
+    path = tmp_path / ("a.mat" if "MATLAB" in kind else "a.parquet")
+    if "MATLAB" in kind:
+        # as a structure of HDF5, whose names are free
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file[name] = samples[None]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    else:
+        name = name if "name" in kind else "a"
+        field = pyarrow.field(name, pyarrow.float64(), metadata=None if "name" in kind else {"unit": "counts"})
+        parquet.write_table(pyarrow.table([samples], schema=pyarrow.schema([field])), path)
+    sensor = Sensor(name, Quantity.ACCELERATION, Dof.X)
+    with pytest.raises(InputError, match=r"sensitivity: found 1.0, allowed is .*\[counts per SI unit\]"):
+        read_recording(path, (sensor,), 1000.0)
+    np.testing.assert_allclose(read_recording(path, (replace(sensor, sensitivity=2.0),), 1000.0).samples[:3, 0], [0.0, 0.5, 1.0])
 
 
 def test_a_campaign_never_takes_an_unknown_unit_as_si(tmp_path):
