@@ -114,7 +114,7 @@ def test_hits_give_the_same_receptance():
 
 @pytest.mark.parametrize("path", names("stock.*"), ids=lambda path: path.name)
 def test_bodies_are_a_block(path):
-    points, faces = read_mesh(path)
+    points, faces, _ = read_mesh(path)
     assert points.shape == (8, 3)
     assert faces.shape == (12, 3)
     np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], [[0, 0, -0.01], [0.04, 0.02, 0.0]], atol=1e-9)
