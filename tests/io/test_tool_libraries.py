@@ -20,7 +20,7 @@ from rcsa_ident.io.tool_libraries import Assumptions, file_names, import_tools, 
 from rcsa_ident.machining_setup import BareCutter
 from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
-from tests.fixtures.tool_library import END_MILL, end_mill, inches, library
+from tests.fixtures.tool_library import END_MILL, HSM, end_mill, inches, library
 
 
 def imported(*entries, **assumed):
@@ -234,28 +234,6 @@ def test_a_text_that_is_no_number_is_refused_by_its_words(told):
     found = imported({"type": "flat end mill", "unit": "millimeters", "geometry": {"DC": told, "NOF": 4}})[0]
     assert found.tooling is None
     assert "geometry.DC: found" in found.reason
-
-
-HSM = """<?xml version="1.0" encoding="UTF-16" standalone="no"?>
-<tool-library version="14" xmlns="http://www.hsmworks.com/xml/2004/cnc/tool-library">
- <tool guid="{1}" type="bull nose end mill" unit="inches" version="1.5">
-  <description>half inch, R 0.03</description>
-  <material name="carbide"/>
-  <body diameter="0.5" number-of-flutes="3" corner-radius="0.03" flute-length="1" overall-length="3" shaft-diameter="0.5"
-   body-length="2" shoulder-length="1" taper-angle="0"/>
-  <holder description="ER20">
-   <section diameter="1" length="0"/><section diameter="1.25" length="0.5"/><section diameter="1.25" length="1.5"/>
-   <section diameter="2" length="0"/><section diameter="2" length="1"/>
-  </holder>
-  <motion spindle-rpm="9000" cutting-feedrate="60"/>
-  <presets><preset id="{a}" name="Aluminium">
-   <parameter key="tool_spindleSpeed" value="12000"/><parameter key="tool_feedCutting" value="40"/>
-   <parameter key="tool_coolant" value="flood"/>
-  </preset></presets>
- </tool>
- <tool type="drill" unit="millimeters"><description>drill</description><body diameter="5"/></tool>
-</tool-library>
-"""
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
