@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rcsa_ident.io.engagements import read_engagement_map
-from rcsa_ident.io.flanges import read_flange_machine
+from rcsa_ident.io.flanges import flange_machine_of, read_flange_machine
 from rcsa_ident.io.forces import read_forces_csv
 from rcsa_ident.io.frf_files import read_frfs
 from rcsa_ident.io.path_forces import read_path_forces
@@ -59,7 +59,9 @@ def test_several_columns_are_one_sentence():
     assert sentence.endswith("CUTS.csv: the columns verdict, chatter_frequency_hz are left aside")
 
 
-def test_a_path_and_frfs_say_it_among_their_own_remarks(tmp_path):
+def test_paths_flanges_and_frfs_say_it_among_their_own_remarks(tmp_path):
+    """The service reads texts."""
+    assert "the column note is left aside" in flange_machine_of(annotated("FLANGE.csv")).remarks
     assert list(tool_path_of(annotated("PATH.csv"), "").remarks) == ["the column note is left aside"]
     (tmp_path / "FRF.csv").write_text(annotated("FRF.csv"))
     found = read_frfs(tmp_path / "FRF.csv")
