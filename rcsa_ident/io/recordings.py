@@ -13,7 +13,6 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import LARGEST_DATA, Channel, Signals, StoredChannel, notes_of
 from rcsa_ident.io.files import MEGABYTE
-from rcsa_ident.io.text_header import name_and_unit
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.told_units import is_untold, quantity_in, volts_in
@@ -146,6 +145,9 @@ def read_signals(
             raise (error if error.where else error.at(str(path))) from None
     signals = signals if isinstance(signals, Signals) else Signals(signals)
     if not signals.units:
+        # the grammar of preambles is no business of those who only name this function
+        from rcsa_ident.io.text_header import name_and_unit
+
         stored = signals.stored or ("",) * len(names)
         signals.stored = tuple(unit or name_and_unit(name)[1] for unit, name in zip(stored, names, strict=True))
     return found, signals
