@@ -145,7 +145,8 @@ def _without_stamps(rows: list[str], delimiter: str, clocks: list[int], dates: l
             # a clock has nine decimals at most
             cells[i] = repr(round(days[i] * _DAY + value - begin[i], 9))
         for i in dates:
-            cells[i] = "0"
+            if i < len(cells):
+                cells[i] = "0"
         found.append((delimiter or " ").join(cells))
     return found
 

@@ -348,6 +348,13 @@ def test_a_row_with_decimal_commas_above_the_table_is_no_header_that_comes_again
     np.testing.assert_array_equal(found["c"], [2.0, 2.0, 3.0])
 
 
+def test_a_row_that_ends_before_its_date_is_read(tmp_path):
+    """Found by fuzzing."""
+    (tmp_path / "record.csv").write_text("clock,acc (g),day\n0:00:01,1,2024-01-01\n0:00:02,2\n0:00:03,4,2024-01-01\n")
+    opened = open_recording(tmp_path / "record.csv")
+    assert (opened.rate, opened.channels[0].samples.tolist()) == (1.0, [G, 2.0 * G, 4.0 * G])
+
+
 def test_a_line_of_quotes_alone_says_nothing(tmp_path):
     """Found by fuzzing: between blanks such a line has no cell."""
     (tmp_path / "record.txt").write_text('"\n1.,\n1\n3\n')
