@@ -123,9 +123,12 @@ def write_modes(path: str | Path, tip: TipModes) -> None:
     values, vectors = np.linalg.eigh(square.real)
     inverse_mass, along = values[:, -1], vectors[:, :, -1]
     other = square - inverse_mass[:, None, None] * along[:, :, None] * along[:, None, :]
-    if np.any(tip.constant) or tip.heights is not None or tip.directions > 3 or np.linalg.norm(other) > 1e-6 * np.linalg.norm(square):
+    lines = np.all(inverse_mass > 0.0) and np.linalg.norm(other) <= 1e-6 * np.linalg.norm(square)
+    if not lines or np.any(tip.constant) or tip.heights is not None or tip.directions > 3:
         allowed = "modes that move along lines, and nothing beside them: MODES.toml holds no others"
-        raise InputError("tip modes", "complex modes, a residual compliance, slopes or a shape along the edge", allowed, str(path))
+        raise InputError(
+            "tip modes", "complex or overdamped modes, a residual compliance, slopes or a shape along the edge", allowed, str(path)
+        )
     omega = np.abs(tip.pole)
     rows = [
         {

@@ -86,7 +86,8 @@ def test_a_mass_in_grams_is_asked_about_and_no_mode_vanishes_for_it(tmp_path):
 def test_what_is_no_motion_along_a_line_is_not_written(tmp_path):
     around = TipModes(np.array([-50.0 + 5000.0j]), np.array([[1.0], [1.0j]]), np.array([[1e-4, -1e-4j]]), np.zeros((2, 2)))
     residual = TipModes(around.pole, np.array([[-1e-4j], [0.0]]), np.array([[1.0, 0.0]]), 1e-9 * np.eye(2))
-    for tip in (around, residual):
+    overdamped = TipModes(np.array([-500.0]), np.array([[1.0], [0.0]]), np.array([[1e-4, 0.0]]), np.zeros((2, 2)))
+    for tip in (around, residual, overdamped):
         with pytest.raises(InputError, match="modes that move along lines"):
             tip.save(tmp_path / "MODES.toml")
 
