@@ -174,6 +174,18 @@ def campaigns(folder: Path) -> list[str]:
     return [CAMPAIGN, CAMPAIGN.split("[[cuts]]")[0] + frf, toml_of(EXAMPLE)]
 
 
+OBLIQUE = """[[modes]]
+natural_frequency_hz = 700.0
+damping_ratio = 0.03
+stiffness_n_per_m = 8e6
+direction_cosines = [0.6, 0.8, 0.0]
+[[z]]
+natural_frequency_hz = 1450.0
+damping_ratio = 0.04
+modal_mass_kg = 0.5
+"""
+
+
 def of_repository(*names: str) -> Seeds:
     return lambda folder: [(ROOT / name).read_bytes() for name in names]
 
@@ -236,6 +248,12 @@ def libraries(folder: Path) -> list[bytes]:
 
     shapes = json.loads((ROOT / "tests" / "fixtures" / "library_of_shapes.json").read_text(encoding="utf-8"))
     return [json.dumps(whole(END_MILL)).encode(), json.dumps(shapes | {"data": shapes["data"][:20]}).encode()]
+
+
+def hsm_libraries(folder: Path) -> list[bytes]:
+    from tests.fixtures.tool_library import HSM
+
+    return [HSM.encode(), HSM.encode("utf-16")]
 
 
 def frames(folder: Path) -> list[bytes]:

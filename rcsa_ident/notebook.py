@@ -26,6 +26,7 @@ from rcsa_ident.io.files import write_text
 from rcsa_ident.io.flanges import write_flange_machine
 from rcsa_ident.io.forces import write_forces
 from rcsa_ident.io.lobes import write_advice, write_lobes, write_map
+from rcsa_ident.io.modes import write_modes
 from rcsa_ident.io.recordings import write_recording
 from rcsa_ident.io.results import write_result
 from rcsa_ident.io.toolings import write_tooling
@@ -52,6 +53,7 @@ from rcsa_ident.stability.advice import Advice
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.units import from_hz, to_cm3_per_min, to_rpm
 from rcsa_ident.workflows.estimate_forces import MonitoredCut
 
@@ -165,6 +167,11 @@ def _(tip: Receptance) -> dict[str, Writer]:
         return {}
     uncertain = tip if isinstance(tip, UncertainReceptance) else UncertainReceptance(tip.omega, tip.values, tip.rows, tip.cols)
     return {".csv": partial(write_tip_csv, tip=uncertain)}
+
+
+@formats.register
+def _(tip: TipModes) -> dict[str, Writer]:
+    return {".toml": partial(write_modes, tip=tip)}
 
 
 @formats.register

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rcsa_ident.errors import InputError, finite
 from rcsa_ident.remarks import Remark, RemarkCode
@@ -250,8 +250,11 @@ TIP_STIFFNESS = Range(
         ("were natural frequencies given in Hz where rad/s is asked for ({})?", 4.0 * math.pi**2),
         ("was it given in N/µm ({})?", 1e6),
         ("was it given in N/mm ({})?", 1e3),
+        ("were modal masses given in g ({})?", 1e-3),
     ),
 )
+#: Of any mode of a tip: one that seems stiffer hardly moves, and limits without it are too high.
+MODE_STIFFNESS = replace(TIP_STIFFNESS, usual=(1e5, 2e10))
 TIP_DAMPING = Range("", 1.0, (0.001, 0.5), (1e-6, 1.0), (("was it given in percent ({})?", 1e-2),))
 RATE = Range("Hz", 1.0, (200.0, 5e6), (0.1, 1e8), (("was it given in kHz ({})?", 1e3),))
 SENSOR_MASS = Range("g", 1e-3, (0.0, 100.0), (0.0, 1000.0), (("was it given in g ({})?", 1e-3),))

@@ -30,6 +30,7 @@ def listen(
     speed: float | None = None,
     between: tuple[float, float] | None = None,
     rate: float | None = None,
+    sensitivity: float | None = None,
 ) -> Listening:
     """Return what a recording of any sensor says by itself: the spindle's speed, whether it cuts stably or chatters, speeds to try.
 
@@ -49,6 +50,8 @@ def listen(
         Speeds that the machine may turn at.
     rate : float, optional [Hz]
         Of a file that tells none.
+    sensitivity : float, optional
+        Signal per SI unit, as 0.0102 V per m/s²; of channels in volts or in a unit that is not known.
 
     Raises
     ------
@@ -71,7 +74,7 @@ def listen(
     if quantity is not None and quantity not in known:
         raise InputError("quantity", quantity, ", ".join(known))
     opened = open_recording(path, channels, rate)
-    measured, chosen, assumed = opened.of(None if quantity is None else Quantity(quantity), channels)
+    measured, chosen, assumed = opened.of(None if quantity is None else Quantity(quantity), channels, sensitivity)
     with threadpool_limits(1):
         answer = listen_to(opened.rate, [each.samples for each in chosen], measured, teeth, speed, between, path.name)
     return replace(answer, reasons=(*answer.reasons, *assumed))

@@ -205,9 +205,8 @@ def read_modes(path: str | Path, *further: str | Path) -> TipModes:
     tip: 1 mode at 900 Hz
     """
     from rcsa_ident.io.modal_files import read_modes_files
-    from rcsa_ident.stability.tip_modes import TipModes
 
-    return TipModes.of(read_modes_files([str(each) for each in (path, *further)]).models)
+    return read_modes_files([str(each) for each in (path, *further)]).modes
 
 
 def read_tap_tests(

@@ -198,7 +198,10 @@ class Client(Uploads, Jobs):
         )
 
     def listen(self, recording: Path, **further: Any) -> ListenAnswer:
-        """Return what a recording says; options channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, curves."""
+        """Return what a recording says.
+
+        Options channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, sensitivity, curves.
+        """
         query = {"name": recording.name, **_query(further)}
         with recording.open("rb") as opened:
             headers = {"Content-Type": "application/octet-stream"}

@@ -44,11 +44,12 @@ def listen(path: Path, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
     name : str
         Given by the client; its suffix is the format.
     asked : mapping
-        The query's parameters by name: channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, curves.
+        The query's parameters by name: channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, sensitivity, curves.
     """
     opened = _opened(path, name, asked["channel"], asked["rate_hz"])
     try:
-        quantity, channels, assumed = opened.of(None if asked["quantity"] is None else Quantity(asked["quantity"]), asked["channel"])
+        quantity = None if asked["quantity"] is None else Quantity(asked["quantity"])
+        quantity, channels, assumed = opened.of(quantity, asked["channel"], asked["sensitivity"])
         speed = None if asked["speed_rpm"] is None else from_rpm(asked["speed_rpm"])
         between = None if asked["speeds_from"] is None else (from_rpm(asked["speeds_from"]), from_rpm(asked["speeds_to"]))
         answer = listen_to(opened.rate, [each.samples for each in channels], quantity, asked["teeth"], speed, between, name)

@@ -16,6 +16,7 @@ from api.security import Guarded, WhoAsks
 from api.stores.entities import digest_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.tested_cuts import tested_cuts_of
+from rcsa_ident.io.unread_columns import left_aside, reading_tables
 from rcsa_ident.units import to_rpm
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
@@ -66,7 +67,8 @@ async def tested_cuts(request: Request) -> TestedCutsAnswer:
 
     def read() -> TestedCutsAnswer:
         try:
-            found = tested_cuts_of(utf8(raw), "")
+            with reading_tables():
+                found, warnings = tested_cuts_of(utf8(raw), ""), left_aside()
         except InputError as error:
             # a body has no file's name, but lines
             field = ", ".join(filter(None, (error.where.strip(), error.field)))
@@ -75,6 +77,7 @@ async def tested_cuts(request: Request) -> TestedCutsAnswer:
             raise InputError("cuts", f"{len(found.verdict)} of them", f"at most {MOST_TESTED}")
         # what is written in rev/min and mm comes back so
         columns = ([float(f"{value:.12g}") for value in values] for values in (to_rpm(found.spindle_speed), 1e3 * found.axial_depth))
-        return TestedCutsAnswer(cuts=[tested_cut(*row) for row in enumerate(zip(*columns, found.verdict, strict=True))])
+        cuts = [tested_cut(*row) for row in enumerate(zip(*columns, found.verdict, strict=True))]
+        return TestedCutsAnswer(cuts=cuts, warnings=warnings)
 
     return await run_in_threadpool(read)

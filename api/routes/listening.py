@@ -69,13 +69,14 @@ async def listen(
     speeds_from: Speed = None,
     speeds_to: Speed = None,
     rate_hz: Rate = None,
+    sensitivity: Sensitivity = None,
     curves: Annotated[bool, Query(description="Also what a page draws.")] = False,
 ) -> ListenAnswer:
     if (speeds_from is None) != (speeds_to is None):
         raise InputError("speeds_from" if speeds_from is None else "speeds_to", "nothing", "both of them, or neither")
     asked = {
         "channel": channel, "quantity": quantity, "teeth": teeth, "speed_rpm": speed_rpm, "speeds_from": speeds_from,
-        "speeds_to": speeds_to, "rate_hz": rate_hz, "curves": curves,
+        "speeds_to": speeds_to, "rate_hz": rate_hz, "sensitivity": sensitivity, "curves": curves,
     }  # fmt: skip
     async with _files(request, components, caller.group, "recording", name, 1) as (file,):
         found = components.reader.run(reader_tasks.listen, file[1].path, file[0], asked)

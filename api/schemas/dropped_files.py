@@ -57,6 +57,7 @@ class TestedCutsAnswer(Answer):
     """Cuts that were tried."""
 
     cuts: list[TestedCut]
+    warnings: list[str] = Field(description="Which columns were left aside.")
 
 
 def tested_cut(index: int, row: tuple[float, float, str]) -> TestedCut:

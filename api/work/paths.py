@@ -29,7 +29,7 @@ from rcsa_ident.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.lobes import DRAWS
 from rcsa_ident.stability.methods import method_named
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.toolpath.dexel import DexelField, memory_of
+from rcsa_ident.toolpath.dexel import DexelField, Surface, memory_of
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.units import to_hz
 from rcsa_ident.workflows.path_milling import mill_path
@@ -196,7 +196,7 @@ def _count_instants(path: ToolPath, request: PathRequest) -> None:
         raise InputError("path", f"one of {instants:.2g} instants", f"at most {MOST_INSTANTS:g}: a part of the path, or fewer steps a turn")
 
 
-def _stock(request: PathRequest) -> tuple[tuple[FloatArray, FloatArray] | None, tuple[FloatArray, np.ndarray] | None]:
+def _stock(request: PathRequest) -> tuple[tuple[FloatArray, FloatArray] | None, Surface | None]:
     """A block's corners [m], or the surface of an STL file."""
     if request.block is not None:
         return (np.array(request.block[:3]), np.array(request.block[3:])), None

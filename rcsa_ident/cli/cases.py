@@ -37,7 +37,6 @@ def cases(
 ) -> None:
     """Count tested cuts of several toolings and cuts beside the lobes, and draw all of them in one figure."""
     from rcsa_ident.io.cases import read_cases
-    from rcsa_ident.io.tested_cuts import left_aside
     from rcsa_ident.report.lobes import Judged, Panel, cases_figure, save_figure
     from rcsa_ident.report.summaries import tally_summary
     from rcsa_ident.workflows.tool_change import classify_tested_cuts
@@ -57,7 +56,6 @@ def cases(
             change = change_of(machine, case.tooling, cut, speeds, False, 0.0)
             lobes = change.limits()
             remarks += [f"{case.name}: {remark}" for remark in change.remarks(lobes)]
-            remarks += [] if case.tests is None else [f"{case.name}: {remark}" for remark in left_aside(case.tests)]
             own = None if case.cuts is None else classify_tested_cuts(change, case.cuts)
             idle, others, said = _idle(case, change) if case.idle else (None, {}, ())
             remarks += [f"{case.name}, from tap tests: {remark}" for remark in said]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from rcsa_ident.errors import InputError, RcsaIdentError, no_cache
+from rcsa_ident.io.unread_columns import left_aside, reading_tables
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn, TaskID
@@ -50,6 +51,7 @@ _OPTIONS = {
     "force": ("force", ""),
     "response": ("response", ""),
     "channel": ("channel", ""),
+    "sensitivity": ("sensitivity", ""),
     "sampling_rate_hz": ("rate_hz", ""),
     "mass": ("mass_g", ""),
     "cell": ("cell_mm", ""),
@@ -66,7 +68,11 @@ def answers(command: Command) -> Command:
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         try:
-            return command(*args, **kwargs)
+            with reading_tables():
+                answer = command(*args, **kwargs)
+                for sentence in left_aside():
+                    warn(sentence)
+            return answer
         except InputError as found:
             error = _in_options(found, kwargs)
             _refuse(str(error), BAD_INPUT, kwargs.get("json_"), {"field": error.field, "where": error.where})
@@ -155,7 +161,9 @@ class Line:
 
 
 def emit(data: Any) -> None:
-    """Print one JSON object; what is not finite becomes null."""
+    """Print one JSON object; what is not finite becomes null, and its warnings name columns that were left aside."""
+    if isinstance(data, dict) and "warnings" in data:
+        data = data | {"warnings": [*data["warnings"], *left_aside()]}
     typer.echo(json.dumps(_finite(data), ensure_ascii=False))
 
 

@@ -68,11 +68,10 @@ def _known_tip(options: TipOptions) -> TipSource:
     """What stands in the place of a machine: a modal model of the tip, or tap tests of it."""
     from rcsa_ident.io.modal_files import read_modes_files
     from rcsa_ident.machine.known_tip import KnownTip
-    from rcsa_ident.stability.tip_modes import TipModes
 
     if options.modes:
         found = read_modes_files(options.modes)
-        return KnownTip(TipModes.of(found.models), found.coefficients)
+        return KnownTip(found.modes, found.coefficients)
     return KnownTip(idle_tip(options.frf or [], options.frf_units, options.frf_from_hz, options.frf_correction or ()))
 
 

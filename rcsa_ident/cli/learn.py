@@ -96,7 +96,7 @@ def learn(
     from rcsa_ident.cli.learn_toolings import New, learn_from_campaign, learn_from_taps
     from rcsa_ident.io.learnt_tips import believed as told
     from rcsa_ident.io.learnt_tips import write_learnt_tip
-    from rcsa_ident.io.tested_cuts import left_aside, read_tested_cuts
+    from rcsa_ident.io.tested_cuts import read_tested_cuts
     from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts
 
@@ -118,7 +118,7 @@ def learn(
     writable(out)
     spec = cut_of(cut)
     cuts = read_tested_cuts(tests)
-    remarks = left_aside(tests)
+    remarks: list[str] = []
     belief, tooling, earlier = believed_of(files, tip, spec, stiffness_spread)
     number = len(cuts.verdict)
     if earlier is not None:

@@ -27,6 +27,9 @@ def listen(
     recordings: Annotated[list[Path], typer.Argument(help="Recordings of a spindle: sound of a phone, CSV, ...", show_default=False)],
     channel: Annotated[list[str], typer.Option(help="Channel that is listened to; more than once for several.", show_default=False)] = [],  # noqa: B006
     quantity: Annotated[Listened | None, typer.Option(help="What it measures, where the file does not say.", show_default=False)] = None,
+    sensitivity: Annotated[
+        float | None, typer.Option(help="Signal per SI unit, of a channel in volts or in an unknown unit.", show_default=False)
+    ] = None,
     teeth: Annotated[int | None, typer.Option(min=1, help="Teeth of the cutter; heard if left out.", show_default=False)] = None,
     speed_rpm: Annotated[float | None, typer.Option(help="Programmed spindle speed, rev/min.", show_default=False)] = None,
     speeds_from: Annotated[float | None, typer.Option(help="Lowest speed of the machine, rev/min.", show_default=False)] = None,
@@ -55,7 +58,7 @@ def listen(
         with stages.stage(str(path)):
             opened = open_recording(path, channel, rate_hz)
             try:
-                measured, channels, assumed = opened.of(told, channel)
+                measured, channels, assumed = opened.of(told, channel, sensitivity)
                 speed = None if speed_rpm is None else from_rpm(speed_rpm)
                 answer = listen_to(opened.rate, [each.samples for each in channels], measured, teeth, speed, between, path.name)
             except InputError as error:

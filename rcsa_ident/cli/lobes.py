@@ -195,7 +195,7 @@ def tell_lobes(
 ) -> None:
     """Write and print the stability lobes of what is asked about, and what is recommended; options as of `lobes`, lengths in metres."""
     from rcsa_ident.io.lobes import write_lobes, write_map
-    from rcsa_ident.io.tested_cuts import left_aside, read_tested_cuts, write_tests
+    from rcsa_ident.io.tested_cuts import read_tested_cuts, write_tests
     from rcsa_ident.workflows.advise import advise
     from rcsa_ident.workflows.tool_change import map_of, probabilities_stable, surface_of
 
@@ -204,10 +204,7 @@ def tell_lobes(
         cuts = None if tests is None else read_tested_cuts(tests)
         advice = advise(change, tested=cuts)
         surface = None if surface_depth is None else surface_of(change, surface_depth)
-    found, remarks = (
-        advice.lobes,
-        [*advice.remarks, *([] if surface is None else surface.warnings), *([] if tests is None else left_aside(tests))],
-    )
+    found, remarks = advice.lobes, [*advice.remarks, *([] if surface is None else surface.warnings)]
     chart = None
     if map_ is not None:
         with stages.stage("map"):

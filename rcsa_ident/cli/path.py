@@ -14,6 +14,7 @@ from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.toolpath.dexel import Surface
 
 PathFile = Annotated[Path, typer.Argument(help="PATH.nc (G-code) or PATH.csv of the tool's tip.", show_default=False)]
 
@@ -101,7 +102,7 @@ def remove(
             say(f"written: {written}" + (f" ({found.seconds:.2f} s)" if written == out else ""))
 
 
-def stock_of(text: str) -> tuple[tuple[FloatArray, FloatArray] | None, tuple[FloatArray, Any] | None]:
+def stock_of(text: str) -> tuple[tuple[FloatArray, FloatArray] | None, Surface | None]:
     """Return a block by its corners [m] or a surface, whichever an option names."""
     from rcsa_ident.io.meshes import read_mesh
 

@@ -15,10 +15,11 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE
-from rcsa_ident.io.time_base import seconds_per, uniform
+from rcsa_ident.io.time_base import uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import LONGEST, Quantity
+from rcsa_ident.signals.told_units import seconds_in
 
 RATE = "sampling_rate_hz"
 #: Columns of times in files of columns with names and nothing else: ``time`` in seconds, or with its unit behind.
@@ -246,7 +247,7 @@ def time_scale(name: str) -> float | None:
     (1.0, 0.001, None)
     """
     found = _TIME.fullmatch(name)
-    return seconds_per(found["unit"] or "") if found else None
+    return seconds_in(found["unit"] or "s") if found else None
 
 
 def lacks(what: str, package: str, extra: str, where: str) -> InputError:

@@ -6,7 +6,7 @@ With columns of the joint it is the flange alone, and the joint stands in front 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, fields
+from dataclasses import astuple, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
+from rcsa_ident.io.unread_columns import left_aside, reading_tables
 from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
@@ -115,8 +116,10 @@ def read_flange_machine(path: str | Path) -> FlangeMachine:
 
 
 def flange_machine_of(text: str, name: str = "flange") -> FlangeMachine:
-    """Return the same of a text; errors name its lines."""
-    return _machine(table_of(text, "flange", ""), name)
+    """Return the same of a text, columns that are left aside among its remarks; errors name its lines."""
+    with reading_tables():
+        machine = _machine(table_of(text, "flange", ""), name)
+        return replace(machine, assumed=tuple(left_aside()))
 
 
 def _machine(table: TextTable, name: str) -> FlangeMachine:

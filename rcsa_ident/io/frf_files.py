@@ -228,8 +228,11 @@ def _only(tests: list[TapTest], pair: tuple[str, str], path: str) -> TapTest:
 
 def _from_csv(path: str | Path) -> list[TapTest]:
     curves = read_frf_csv(path)
+    cross = {f"{response}{force}_{part}" for response, force in permutations(AXES, 2) for part in ("re", "im")}
+    unread = [name for name in curves.bands if name not in cross]
+    said = (Remark(RecordCode.ASSUMED, f"not read: {listed(unread)}"),) if unread else ()
     found = [
-        TapTest(curves.frequency, values, axis, axis, i, "tip / tip", str(path))
+        TapTest(curves.frequency, values, axis, axis, i, "tip / tip", str(path), said)
         for i, (axis, values) in enumerate(curves.values.items(), 1)
     ]
     for response, force in permutations(AXES, 2):

@@ -123,7 +123,7 @@ def _table(lines: Sequence[str], start: int, delimiter: str, decimal: str, width
     rows = [(delimiter or " ").join(first), *(line for line in lines[start + 1 :] if line and not line.isspace())]
     if len(rows) < 2:
         raise InputError("FRF", f"{len(rows)} lines of numbers", f"two or more of {_ALLOWED}", where)
-    plain = [row.rstrip(" \t\r" + delimiter) for row in rows]
+    plain = [row.lstrip().rstrip(" \t\r" + delimiter) for row in rows]
     plain = [row.replace(",", ".") for row in plain] if decimal == "," else plain
     try:
         table = np.loadtxt(plain, delimiter=delimiter or None, comments=None, ndmin=2)

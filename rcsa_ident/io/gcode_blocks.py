@@ -78,11 +78,11 @@ def block_of(line: str) -> str:
         return ""
     if "=" in text:
         text = _TURNS.sub(lambda turns: f"P{int(turns[1]) + 1}", _RADIUS.sub(r"R\1", text))
-    if _MACRO.search(text):
-        raise InputError("block", text, "numbers: macros are not run")
     words = _CORNER.sub(r"\1\2", text) if "," in text else text
     known = _WORDS.match(words)
     if known is None or known.end() != len(words):
+        if _MACRO.search(text):
+            raise InputError("block", text, "numbers: macros are not run")
         rest = words[known.end() if known else 0 :]
         allowed = "words of a letter and a number with a decimal point, comments in ( ) or behind ;"
         raise InputError("block", rest, allowed)
@@ -94,7 +94,9 @@ def block_of(line: str) -> str:
 def words_of(block: str) -> tuple[dict[str, list[float]], dict[str, float], dict[str, float]]:
     """Return G and M codes of a line, the G codes by what they set, and its further words."""
     codes: dict[str, list[float]] = {"G": [], "M": []}
-    for letter, value in _CODES.findall(block):
+    # most lines are moves without a code
+    coded = "G" in block or "M" in block
+    for letter, value in _CODES.findall(block) if coded else ():
         codes[letter].append(float(value))
     told: dict[str, float] = {}
     for code in codes["G"]:
@@ -110,22 +112,22 @@ def words_of(block: str) -> tuple[dict[str, list[float]], dict[str, float], dict
     corners = _CORNER.findall(block) if "," in block else []
     if len(corners) > 1:
         raise InputError("block", block, "one corner in a line, ,R or ,C")
-    rest = _CODES.sub("", _CORNER.sub("", block) if corners else block)
+    rest = _CORNER.sub("", block) if corners else block
+    rest = _CODES.sub("", rest) if coded else rest
     found = parse_parameters(_BARE_POINT.sub("", rest))
     if len(found) != sum(map(str.isalpha, rest)):
         raise InputError("block", block, "each word once in a line")
-    for letter, value in found.items():
-        if letter not in _LETTERS and not (letter in ROTARY and float(value) == 0.0) and not (letter == "E" and 187 in codes["G"]):
-            raise InputError("block", f"{letter}{value}", f"words {', '.join(_LETTERS)}, G and M: other axes are followed at 0 alone")
-        if not abs(float(value)) <= _LARGEST_NUMBER:
-            raise InputError(letter, value, f"at most {_LARGEST_NUMBER:g}")
-    if 5 in codes["G"] and found.keys() & set("XYZIJK"):
+    words = {letter: float(value) for letter, value in found.items()}
+    for letter, number in words.items():
+        if letter not in _LETTERS and not (letter in ROTARY and number == 0.0) and not (letter == "E" and 187 in codes["G"]):
+            raise InputError(
+                "block", f"{letter}{found[letter]}", f"words {', '.join(_LETTERS)}, G and M: other axes are followed at 0 alone"
+            )
+        if not abs(number) <= _LARGEST_NUMBER:
+            raise InputError(letter, found[letter], f"at most {_LARGEST_NUMBER:g}")
+    if 5 in codes["G"] and words.keys() & set("XYZIJK"):
         raise InputError("block", block, "G5 with P alone: splines are not followed")
-    return (
-        codes,
-        told,
-        {letter: float(value) for letter, value in found.items()} | {f",{letter}": float(value) for letter, value in corners},
-    )
+    return codes, told, words | {f",{letter}": float(value) for letter, value in corners}
 
 
 def check_further(

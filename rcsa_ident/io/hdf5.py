@@ -22,6 +22,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, Bytes, existing_file, mapped, replacing
+from rcsa_ident.io.matlab_elements import wanted
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.signals.recording import LONGEST
 
@@ -263,7 +264,7 @@ def _check_kind(dataset: h5py.Dataset, kinds: Sequence[str], field: str, where: 
     fixed = described.dtype.kind == "S" and described.dtype.itemsize <= 64 and math.prod(described.shape) == 1
     kind = bytes(np.ravel(dataset.attrs["MATLAB_class"])[0]).decode("ascii", "replace") if fixed else "no name"
     if kind not in kinds:
-        raise InputError(field, f"values of class {kind}", "real numbers", where)
+        raise InputError(field, f"values of class {kind}", wanted(kind), where)
 
 
 def _cause(error: Exception) -> str:

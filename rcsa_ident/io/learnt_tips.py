@@ -132,7 +132,7 @@ def learnt_tip_of(data: Any, where: str) -> LearntTip:
     modes = table.tables("modes")
     pole = 2.0 * np.pi * np.array([complex(*mode.numbers("pole", 2, "Hz")) for mode in modes])
     with table.naming({}):
-        tip = TipModes(pole, _complex(modes, "outputs").T, _complex(modes, "inputs"), _matrix(table, "residual_compliance", 2))
+        tip = TipModes(pole, _complex(modes, "outputs").T, _complex(modes, "inputs"), _matrix(table, "residual_compliance", None))
         prior = UncertainTip(
             tip,
             _matrix(table, "root", None),

@@ -21,9 +21,10 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.channels import LARGEST_FILE, RATE, Channel, check_lengths, placed, snapped, the_only, time_scale
 from rcsa_ident.io.files import existing_file, mapped
-from rcsa_ident.io.matlab_elements import COMPLETE, HEADER, NUMBERS, Version5
-from rcsa_ident.io.time_base import Irregular, seconds_per, time_unit
+from rcsa_ident.io.matlab_elements import COMPLETE, EXPORTED, HEADER, NUMBERS, Version5
+from rcsa_ident.io.time_base import Irregular, time_unit
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.signals.told_units import seconds_in
 
 #: Variables that hold the rate [Hz] or the interval [s], without signs and capitals.
 _RATES = ("samplingratehz", "fs", "fshz", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "samplingfreq")
@@ -70,17 +71,21 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None, 
 def told_channels(path: Path) -> list[tuple[str, str]]:
     """Return the vectors of numbers on the root, and the signals of its matrices, but times and rates, each with an empty unit."""
     found: list[tuple[str, str]] = []
+    refused: list[InputError] = []
     with tables_of(path) as tables:
         for name in tables.names(""):
             if time_unit(name) is not None or _plain(name) in (*_RATES, *_STEPS):
                 continue
             try:
                 shape = tables.shape(name)
-            except InputError:  # a text, a struct, a cell
+            except InputError as error:  # a text, a struct, a cell
+                refused += [error] if error.allowed == EXPORTED else []
                 continue
             signals, samples = min(shape), max(shape)
             if len(shape) == 2 and 0 < signals < samples:
                 found += [(name if signals == 1 else f"{name}({i + 1})", "") for i in range(min(signals, _MOST_LISTED))]
+    if refused and not found:
+        raise refused[0]
     return found
 
 
@@ -175,7 +180,7 @@ def _plain(name: str) -> str:
 
 def _seconds(name: str) -> float:
     """Seconds per unit of a vector of times, by its name."""
-    return seconds_per(time_unit(name.rpartition(".")[2]) or "") or 1.0
+    return seconds_in(time_unit(name.rpartition(".")[2]) or "s") or 1.0
 
 
 def _rises(tables: Tables, name: str, samples: int) -> bool:

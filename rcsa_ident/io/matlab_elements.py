@@ -32,6 +32,9 @@ _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"
 _COMPLEX = 0x0800
 #: Of a variable's own header, and around its samples.
 _LARGEST_HEAD = 4096
+#: Classes of objects that hold a recording in a layout that nobody publishes, and what is wanted in their place.
+_TABLES = ("table", "timetable")
+EXPORTED = "real numbers; of a timetable TT write vectors: t = seconds(TT.Time - TT.Time(1)); x = TT.x"
 #: Kinds that hold others.
 NESTED = ("struct", "cell")
 _DEEPEST = 16
@@ -101,7 +104,8 @@ def _header(head: bytes, order: str, start: int, size: int, packed: bool, where:
     flags = struct.unpack_from(f"{order}I", head, place)[0]
     kind = _CLASSES.get(flags & 0xFF, "unknown")
     if kind in ("opaque", "unknown"):  # laid out in another way
-        return Variable("", kind, (), False, start, size, packed, length + 8, 0)
+        name, kind = _object(head, order, after) if kind == "opaque" else ("", kind)
+        return Variable(name, kind, (), False, start, size, packed, length + 8, 0)
     _, place, count, after = _tag(head, order, after)
     if not 8 <= count <= 128:
         raise InputError("recording", f"a variable of {count // 4} dimensions", "from 2 to 32", where)
@@ -113,11 +117,26 @@ def _header(head: bytes, order: str, start: int, size: int, packed: bool, where:
     return Variable(name, kind, shape, bool(flags & _COMPLEX), start, size, packed, length + 8, after)
 
 
+def _object(head: bytes, order: str, place: int) -> tuple[str, str]:
+    """Name and class of an object; the name is empty where it is no table."""
+    texts = []
+    for _ in range(3):  # its name, the system of types, its class
+        _, at, count, place = _tag(head, order, place)
+        texts.append(head[at : at + count].rstrip(b"\0").decode("utf-8", "replace"))
+    name, _, kind = texts
+    return name if kind in _TABLES else "", kind
+
+
+def wanted(kind: str) -> str:
+    """Return what is allowed in the place of values of a class."""
+    return EXPORTED if kind in _TABLES else "real numbers"
+
+
 def check(variable: Variable, where: str) -> None:
     """Refuse what is no table of real numbers."""
     field = f"channel {variable.name}"
     if variable.kind not in NUMBERS or variable.is_complex:
-        raise InputError(field, f"values of class {'complex ' * variable.is_complex}{variable.kind}", "real numbers", where)
+        raise InputError(field, f"values of class {'complex ' * variable.is_complex}{variable.kind}", wanted(variable.kind), where)
 
 
 def members(raw: Bytes, order: str, variable: Variable, where: str) -> tuple[bytes, list[Variable]]:

@@ -15,7 +15,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes, replacing
 from rcsa_ident.remarks import Remark, counted
 from rcsa_ident.signals.verdict import RecordCode
-from rcsa_ident.toolpath.dexel import check_closed
+from rcsa_ident.toolpath.dexel import Surface, check_closed
 
 #: Suffixes of files that are read and written.
 MESHES = (".stl", ".obj", ".ply")
@@ -28,24 +28,8 @@ _OTHERS = {"metres": 1e3, "micrometres": 1e-3}
 _BEFORE, _FACET = 84, 50
 
 
-class Surface(tuple[FloatArray, np.ndarray]):
-    """Points, shape (v, 3) [m], and triangles, shape (f, 3), of a closed surface, with what was remarked as it was read."""
-
-    remarks: tuple[Remark, ...]
-
-    def __new__(cls, points: FloatArray, faces: np.ndarray, remarks: tuple[Remark, ...] = ()) -> Surface:
-        """Return the pair with its remarks."""
-        surface = super().__new__(cls, (points, faces))
-        surface.remarks = remarks
-        return surface
-
-    def __reduce__(self) -> tuple[type[Surface], tuple[FloatArray, np.ndarray, tuple[Remark, ...]]]:
-        """Pickle and copy with the remarks."""
-        return type(self), (self[0], self[1], self.remarks)
-
-
 def read_mesh(path: str | Path) -> Surface:
-    """Return the points, shape (v, 3) [m], and triangles, shape (f, 3), of a closed surface whose file is in millimetres.
+    """Return a closed surface whose file is in millimetres.
 
     Facets whose corners are not three points have no area: they are left out, which is remarked.
 

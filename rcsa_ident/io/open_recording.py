@@ -10,7 +10,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import RATE, notes_of
 from rcsa_ident.io.recordings import READERS, SOUND, read_signals
 from rcsa_ident.io.text_header import name_and_unit
-from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, known_unit, told_table
+from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, told_table
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.told_units import quantity_in
@@ -58,7 +58,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
     if suffix not in _LISTING:
         raise InputError("recording", f"suffix '{suffix}'", f"one of {', '.join(dict.fromkeys([*TEXT, *READERS]))}", str(path))
     told: dict[str, str] = dict(import_module(f"rcsa_ident.io.{_LISTING[suffix]}").told_channels(path))
-    units = {name: name_and_unit(name, known_unit)[1] or unit for name, unit in told.items()}
+    units = {name: name_and_unit(name)[1] or unit for name, unit in told.items()}
     # beside channels of known units there may be others of another length or rate
     wanted = list(names) or [name for name, unit in units.items() if quantity_in(unit)[1] is not None] or list(units)
     if not wanted:
@@ -70,9 +70,10 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
             raise InputError(RATE, "nothing in the file", "the rate [Hz], told", str(path)) from None
         raise
     channels = []
-    for name, signal in zip(wanted, signals, strict=True):
-        factor, quantity = quantity_in(units.get(name, ""))
-        channels.append(OpenChannel(name, units.get(name, ""), quantity, factor * signal[:]))
+    for name, signal, stored in zip(wanted, signals, signals.stored, strict=True):
+        unit = units.get(name) or stored
+        factor, quantity = quantity_in(unit)
+        channels.append(OpenChannel(name, unit, quantity, factor * signal[:]))
     return OpenRecording(rate, tuple(channels))
 
 

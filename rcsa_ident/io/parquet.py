@@ -20,6 +20,7 @@ from rcsa_ident.io.channels import (
     RATE,
     Channel,
     Scratch,
+    Signals,
     cannot_be_read,
     check_declared,
     check_lengths,
@@ -89,6 +90,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
                 for column, name in zip(rows, wanted, strict=True):
                     column.add(_numbers(batch, name, pyarrow))
             columns = [column.channel() for column in rows]
+            told = [file.schema_arrow.field(name).metadata or {} for name in names]
+            units = tuple((each.get(b"unit") or each.get(b"units") or b"").decode("utf-8", "replace") for each in told)
     except InputError:
         raise
     except Exception as error:
@@ -97,9 +100,10 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     if len(wanted) == len(names):
         if rate is None:
             raise InputError(RATE, "nothing", f"a column 'time' [s], the file's metadata {RATE}, or the campaign's rate [Hz]", where)
-        return positive(RATE, rate, "Hz"), columns
+        return positive(RATE, rate, "Hz"), Signals(columns, stored=units)
     try:
-        return placed(columns[-1][:] * (time_scale(wanted[-1]) or 1.0), columns[:-1], rate)
+        rate, columns = placed(columns[-1][:] * (time_scale(wanted[-1]) or 1.0), columns[:-1], rate)
+        return rate, Signals(columns, stored=units)
     except Irregular as error:
         raise InputError(f"column {wanted[-1]} row {error.row + 1}", error.found, error.allowed, where) from None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from rcsa_ident.io.curves import write_speed_csv
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.gcode import Kept, read_gcode, write_gcode
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
+from rcsa_ident.io.unread_columns import left_aside, reading_tables
+from rcsa_ident.remarks import Remark
+from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
@@ -32,7 +36,7 @@ def read_tool_path(path: str | Path) -> ToolPath:
 
     A table has columns ``x_mm``, ``y_mm``, ``z_mm``; ``i``, ``j``, ``k`` of the tool's axis from the tip into the spindle, by default
     upwards; ``feed_mm_per_min``, ``inf`` for a rapid move, and ``spindle_speed_rpm`` of the move that ends at the row's place, empty where
-    nobody told. Further ones are left aside.
+    nobody told.
 
     Raises
     ------
@@ -59,8 +63,11 @@ def read_tool_path(path: str | Path) -> ToolPath:
 
 
 def tool_path_of(text: str, where: str) -> ToolPath:
-    """Return the path of a table's text as `read_tool_path` finds it in a file; `where` is named in the messages."""
-    return _path_of(table_of(text, "path", where))
+    """Return the path of a table's text as `read_tool_path` finds it in a file, columns that are left aside among its remarks; `where` is
+    named in the messages."""
+    with reading_tables():
+        found = _path_of(table_of(text, "path", where))
+        return replace(found, remarks=tuple(Remark(RecordCode.ASSUMED, sentence) for sentence in left_aside()))
 
 
 def _path_of(table: TextTable) -> ToolPath:

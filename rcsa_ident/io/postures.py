@@ -21,7 +21,7 @@ _DIGITS = 4
 def read_postures(path: str | Path, robot: RobotModel) -> FloatArray:
     """Return the postures of a table, shape (k, j) [rad], all within the joints' limits.
 
-    Columns ``q1_deg``, ``q2_deg`` and so on; further ones are left aside.
+    Columns ``q1_deg``, ``q2_deg`` and so on.
 
     Raises
     ------

@@ -103,8 +103,10 @@ def read_signals(
     suffix: str | None = None,
     cut_off: str = "refuse",
     time: str | None = None,
-) -> tuple[float, Sequence[Channel]]:
+) -> tuple[float, Signals]:
     """Return the sampling rate [Hz] and the named channels as they stand in a file, shape (n,) each; long ones may stay in it.
+
+    Where a format has no place for units, names may tell them, as ``acc (mV)``.
 
     Parameters
     ----------
@@ -138,9 +140,17 @@ def read_signals(
     # what overflows or is no number is a lost sample, see below
     with np.errstate(all="ignore"):
         try:
-            return reader(path, names, default_rate, **options)
+            found, signals = reader(path, names, default_rate, **options)
         except InputError as error:
             raise (error if error.where else error.at(str(path))) from None
+    signals = signals if isinstance(signals, Signals) else Signals(signals)
+    if not signals.units:
+        # the grammar of preambles is no business of those who only name this function
+        from rcsa_ident.io.text_header import name_and_unit
+
+        stored = signals.stored or ("",) * len(names)
+        signals.stored = tuple(unit or name_and_unit(name)[1] for unit, name in zip(stored, names, strict=True))
+    return found, signals
 
 
 class StoredSamples:

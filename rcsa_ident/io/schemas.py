@@ -199,6 +199,12 @@ _MODES = (
         "coefficients": {"tangential_mpa": 900.0, "tangential_sd_mpa": 90.0, "radial_mpa": 270.0, "radial_sd_mpa": 50.0},
         "softening_sd_percent_per_1000_rpm": 1.0,
     },
+    {
+        "modes": [
+            _MODE | {"modal_mass_kg": 1.0, "direction_cosines": [0.6, 0.8, 0.0]},
+            _MODE | {"stiffness_n_per_m": 1e7, "direction_cosines": [0.6, 0.8, 0.0]},
+        ]
+    },
 )
 _LINK: dict[str, Any] = {"mass_kg": 200.0}
 _TURNED = {"offset_mm": [0.0, 0.0, 500.0], "turn_deg": [90.0, 0.0, 0.0]}

@@ -19,7 +19,7 @@ CHATTER = "chatter_frequency_hz"
 
 
 def read_tested_cuts(path: str | Path) -> TestedCuts:
-    """Return the cuts of a table with the columns `COLUMNS`, with or without `CHATTER`; further columns are left aside.
+    """Return the cuts of a table with the columns `COLUMNS`, with or without `CHATTER`.
 
     Raises
     ------
@@ -55,10 +55,8 @@ def _conditions(table: TextTable, wanted: tuple[str, ...]) -> tuple[FloatArray, 
 
 def _cuts_of(table: TextTable) -> TestedCuts:
     speed, depth = _conditions(table, COLUMNS)
-    place = table.header.index(COLUMNS[2])
     verdicts = []
-    for row, line in enumerate(table.lines):
-        text = line.split(table.delimiter)[place].strip()
+    for row, text in enumerate(table.texts(COLUMNS[2])):
         if text.lower() not in list(Verdict):
             raise InputError(f"column {COLUMNS[2]}", text or "nothing", f"one of {', '.join(Verdict)}", table.at(row))
         verdicts.append(Verdict(text.lower()))
@@ -74,12 +72,6 @@ def _chatter(table: TextTable) -> FloatArray:
     if wrong.size:
         raise InputError(f"column {CHATTER}", f"{found[wrong[0]]:g}", "a finite number above 0 [Hz], or nothing", table.at(int(wrong[0])))
     return found
-
-
-def left_aside(path: str | Path) -> list[str]:
-    """Return a sentence on each column of a table of tested cuts that nobody reads."""
-    header = read_table(path, "tested cuts").header
-    return [f"{path}: the column {name} is left aside" for name in header if name not in (*COLUMNS, CHATTER)]
 
 
 def write_tests(path: str | Path, cuts: TestedCuts, probability: FloatArray) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from rcsa_ident.io.channels import Channel, Scratch, placed
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.text_header import DELIMITERS
 from rcsa_ident.io.time_base import Irregular
+from rcsa_ident.io.unread_columns import unread_of
 from rcsa_ident.io.validated_table import listed
 
 LARGEST_TEXT = 256 * MEGABYTE
@@ -37,6 +38,8 @@ class TextTable:
         Without header and empty lines; the decimal sign is a point.
     numbers : list of int
         Line number of each, from 1, as an editor counts.
+    unread : list of str
+        Columns that nobody has asked for yet.
     """
 
     where: str
@@ -44,6 +47,7 @@ class TextTable:
     delimiter: str
     lines: list[str]
     numbers: list[int]
+    unread: list[str] = field(default_factory=list)
 
     def at(self, row: int) -> str:
         """Return file and line of a row."""
@@ -66,13 +70,22 @@ class TextTable:
         """
         if not self.lines:  # a part of a long file that is empty lines alone
             return [np.empty(0) for _ in names]
-        places = [self.header.index(name) for name in names]
+        places = self._places(names)
         try:
             values = np.loadtxt(self.lines, delimiter=self.delimiter, usecols=places, comments=None, ndmin=2)
         except ValueError:
             # empty cells, or one that is wrong and must be found
             values = np.array([self._cells(row, names, places) for row in range(len(self.lines))])
         return [np.ascontiguousarray(values[:, i]) for i in range(len(names))]
+
+    def texts(self, name: str) -> list[str]:
+        """Return the cells of the named column."""
+        (place,) = self._places([name])
+        return [line.split(self.delimiter)[place].strip() for line in self.lines]
+
+    def _places(self, names: Sequence[str]) -> list[int]:
+        self.unread[:] = [name for name in self.unread if name not in names]
+        return [self.header.index(name) for name in names]
 
     def _cells(self, row: int, names: Sequence[str], places: list[int]) -> list[float]:
         cells = self.lines[row].split(self.delimiter)
@@ -105,7 +118,8 @@ def read_table(path: str | Path, field: str, largest: int = LARGEST_TEXT) -> Tex
 
 def table_of(text: str, field: str, where: str) -> TextTable:
     """Return the table of a text, as `read_table` does of a file; `where` is named in the messages."""
-    return _Parts(field, where).next(text)
+    table = _Parts(field, where).next(text)
+    return replace(table, unread=unread_of(where, table.header))
 
 
 class _Parts:

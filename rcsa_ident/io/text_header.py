@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import pairwise
@@ -16,16 +16,15 @@ import numpy as np
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import snapped
-from rcsa_ident.io.time_base import seconds_per, time_unit
+from rcsa_ident.io.time_base import time_unit
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.signals.told_units import UNITS_OF_RATES, is_unit, rate_in, seconds_in
 
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 #: ``name (unit)`` and ``name [unit]``; ``name in unit``, ``name / unit`` and ``name, unit`` where the unit is a known one.
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
 _DIVIDED = re.compile(r"^(?P<name>.*?)(?:(?:^|\s+)in\s+|\s*/\s+|\s*,\s+)(?P<unit>[^,]+)$")
-#: Units in words, as oscilloscopes write them.
-_WORDS = {"volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV", "newton": "N", "newtons": "N"}
 #: What a column of sample numbers is called.
 _COUNTS = re.compile(
     r"(?:sample|point|scan|row|record|sequence|index|idx|nr|no|num|number|count|#|n)s?\.?(?:[ _]?(?:no|nr|number|index|#)\.?)?", re.I
@@ -56,16 +55,10 @@ _BETWEEN = re.compile(
     rf"^(?:\s|\d{{1,3}}\s*[:=]|[:=,;\"']|is\b|of\b|per\b|all\b|channels?\b(?! ?\d)|{_CHANNEL}\b|[(\[](?P<unit>[^()\[\]]*)[)\]])*",
     re.IGNORECASE,
 )
-_HERTZ = {
-    **dict.fromkeys(("hz", "s/s", "sa/s", "samples/s", "samples/sec", "samples/second", "sps", "1/s", "s-1", "s^-1", "hertz"), 1.0),
-    **dict.fromkeys(("khz", "k", "ks/s", "ksa/s", "ksamples/s", "ksps"), 1e3),
-    **dict.fromkeys(("mhz", "ms/s", "msa/s", "msamples/s", "msps"), 1e6),
-}
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:([,.' \u00a0\u202f])\d{3})(?:\1\d{3})*(?![\d])")
 #: Digits from which on an interval is taken for a rounded one.
 _ROUNDED = 5
-RATES_ALLOWED = "a number in Hz, kHz, MHz, S/s, kS/s or MS/s, or of a sampling interval in s, ms, us or ns"
-Known = Callable[[str], bool]
+RATES_ALLOWED = f"a number in {UNITS_OF_RATES}, or of a sampling interval in s, ms, us or ns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +96,7 @@ class Head:
 
 
 def read_head(
-    above: Sequence[str], delimiter: str, comma: bool, width: int, wanted: Sequence[str], known: Known, expected: float | None, where: str
+    above: Sequence[str], delimiter: str, comma: bool, width: int, wanted: Sequence[str], expected: float | None, where: str
 ) -> Head:
     """Return names and units of a table's columns, and the rates, from the lines above its numbers.
 
@@ -118,8 +111,6 @@ def read_head(
         Columns of the table.
     wanted : sequence of str
         Names that tell the line of names where nothing else does.
-    known : callable
-        Whether a text is a unit of something measured.
     expected : float or None [Hz]
         The campaign's rate, which decides between those that an interval's digits leave open.
     where : str
@@ -130,13 +121,8 @@ def read_head(
     InputError
         A line of names has another number of cells than the numbers below, or a rate is told in a unit that is not known.
     """
-
-    def unit(text: str) -> bool:
-        plain = text.strip("()[] ")
-        return known(_WORDS.get(plain.lower(), plain)) or (plain != "" and (seconds_per(plain) is not None or _is_count(plain)))
-
     lines = [line.lstrip("# \t" if delimiter != "\t" else "# ") for line in above]
-    rows = [split(line, delimiter) for line in lines if line.strip(" \t;,")]
+    rows = [row for line in lines if any(row := split(line, delimiter))]
     if not delimiter:
         rows = [_joined(row, width) for row in rows]
     labels = [row[0].strip().rstrip(":").lower() for row in rows]
@@ -152,31 +138,31 @@ def read_head(
         place = table[-1]
         first = next((i for i in (place - 1, place + 1) if i in table or (i in mixed and i == place - 1)), None)
         last, other = rows[place][:width], rows[first][:width] if first is not None else []
-        if first is not None and first < place and _are_units(last, other, unit, wanted):
+        if first is not None and first < place and _are_units(last, other, wanted):
             texts, units, place = other, last, first
-        elif first is not None and first < place and all(unit(cell) for cell in other) and not any(unit(cell) for cell in last):
+        elif first is not None and first < place and all(map(_is_unit, other)) and not any(map(_is_unit, last)):
             texts, units = last, other
         else:
             # oscilloscopes may call columns by their units alone
-            texts, units = last, last if all(unit(cell) for cell in last) else units
+            texts, units = last, last if all(map(_is_unit, last)) else units
     elif rows and not any(marked):
-        _check_width(rows[-1], delimiter, width, unit, where)
+        _check_width(rows[-1], delimiter, width, where)
     for label, row in zip(labels, rows, strict=True):
         cells = [cell for cell in row[1:] if cell]
         if label in _NAMING and not named and len(cells) in (width, width - 1) and not any(map(is_number, cells)):
             texts[width - len(cells) :], named = cells, True
     _label_units(labels, rows, texts, units)
-    names, units = columns_of(texts, units, known)
+    names, units = columns_of(texts, units)
     rates = [*_rates(lines, delimiter, comma, expected, where), *_steps_behind(rows, width, expected, where)]
     return Head(texts, names, units, named, list(dict.fromkeys(rates)))
 
 
-def columns_of(texts: Sequence[str], units: Sequence[str], known: Known) -> tuple[list[str], list[str]]:
+def columns_of(texts: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return names and units of columns from the cells that name them, and from a line of units, empty cells where there is none.
 
     Where two names are one without what stands in brackets, the brackets are part of them.
     """
-    found = [name_and_unit(text, known) for text in texts]
+    found = [name_and_unit(text) for text in texts]
     names = [name for name, _ in found]
     told = [_plain(unit or own) for unit, (_, own) in zip(units, found, strict=True)]
     return (list(texts) if len(set(names)) < len(set(texts)) else names), told
@@ -185,7 +171,7 @@ def columns_of(texts: Sequence[str], units: Sequence[str], known: Known) -> tupl
 def times_of(names: Sequence[str], units: Sequence[str]) -> list[int]:
     """Return the places of columns of times: by their names, or the first column by its unit."""
     told = [i for i, (name, unit) in enumerate(zip(names, units, strict=True)) if time_unit(name, unit) is not None]
-    return told or ([0] if units and units[0] and seconds_per(units[0]) is not None else [])
+    return told or ([0] if units and seconds_in(units[0]) is not None else [])
 
 
 def tells_rate(line: str) -> bool:
@@ -206,24 +192,28 @@ def is_number(text: str) -> bool:
     return re.fullmatch(NUMBER, text.strip().replace(",", ".")) is not None
 
 
-def name_and_unit(text: str, known: Known) -> tuple[str, str]:
+def name_and_unit(text: str) -> tuple[str, str]:
     """Return both of ``name (unit)``, ``name [unit]``, ``name in unit``, ``name / unit`` or ``name, unit``; the unit is empty where none is
     told. What has no letter is no unit: ``channel (1)`` is a name."""
     found = _BRACKETED.match(text)
     if found and re.search(r"[^\W\d_]|[%°-]", found["unit"]):
         return found["name"].strip() or found["unit"].strip(), found["unit"].strip()
     found = _DIVIDED.match(text)
-    if found and (known(found["unit"].strip()) or seconds_per(found["unit"]) is not None):
+    if found and is_unit(found["unit"]):
         return (found["name"] or text).strip(), found["unit"].strip()
     return text, ""
 
 
 def _plain(unit: str) -> str:
-    """A unit without brackets around it, and its sign where it is a word."""
+    """A unit without brackets around it."""
     plain = unit.strip()
-    if plain[:1] + plain[-1:] in ("()", "[]"):
-        plain = plain[1:-1].strip()
-    return _WORDS.get(plain.lower(), plain)
+    return plain[1:-1].strip() if plain[:1] + plain[-1:] in ("()", "[]") else plain
+
+
+def _is_unit(text: str) -> bool:
+    """Whether a cell may stand in a line of units."""
+    plain = text.strip("()[] ")
+    return is_unit(plain) or _is_count(plain)
 
 
 def _is_count(text: str) -> bool:
@@ -249,12 +239,12 @@ def _is_words(row: list[str], width: int) -> bool:
     return any(cells) and not any(is_number(cell) for cell in cells)
 
 
-def _are_units(last: list[str], above: list[str], unit: Known, wanted: Sequence[str]) -> bool:
+def _are_units(last: list[str], above: list[str], wanted: Sequence[str]) -> bool:
     """Whether the lower of two lines gives units to the names in the upper one."""
     filled = [cell for cell in last if cell]
-    if all(cell[:1] + cell[-1:] in ("()", "[]") for cell in filled) or all(unit(cell) or cell in ("-", "%", "rpm") for cell in filled):
+    if all(cell[:1] + cell[-1:] in ("()", "[]") for cell in filled) or all(_is_unit(cell) or cell in ("-", "%", "rpm") for cell in filled):
         return True
-    timed = any(cell and time_unit(name, "") == "" and seconds_per(cell.strip("()[]")) for name, cell in zip(above, last, strict=True))
+    timed = any(cell and time_unit(name, "") == "" and seconds_in(cell.strip("()[]")) for name, cell in zip(above, last, strict=True))
     return timed or bool(wanted and set(wanted) <= set(above) - set(last))
 
 
@@ -271,11 +261,11 @@ def _label_units(labels: Sequence[str], rows: Sequence[list[str]], texts: Sequen
                 units[i] = cell
 
 
-def _check_width(row: list[str], delimiter: str, width: int, unit: Known, where: str) -> None:
+def _check_width(row: list[str], delimiter: str, width: int, where: str) -> None:
     """Refuse a line above the numbers that names columns, but not as many as there are."""
     if any(map(is_number, row)):
         return
-    names = len(row) > 1 if delimiter else any(name_and_unit(cell, unit)[1] for cell in row)
+    names = len(row) > 1 if delimiter else any(name_and_unit(cell)[1] for cell in row)
     if len(row) != width and (names or (delimiter == "," and len(row) == 1)):
         found = f"{len(row)} in '{listed([' '.join(row)[:80]])}' above {width} columns of numbers"
         between = f", divided by {DELIMITERS[delimiter]} as these are" if delimiter else ""
@@ -344,9 +334,8 @@ def _number(text: str, comma: bool) -> tuple[str, str]:
 
 def _in_hertz(text: str, unit: str, interval: bool, expected: float | None, where: str) -> float:
     """A rate [Hz] from a number, which is an interval unless its unit says otherwise."""
-    plain = unit.lower().replace("μ", "µ")
-    hertz = 1.0 if not unit and not interval else None if unit == "mHz" else _HERTZ.get(plain)
-    seconds = seconds_per(unit) if interval and hertz is None else None
+    hertz = rate_in(unit or ("" if interval else "Hz"))
+    seconds = seconds_in(unit or "s") if interval and hertz is None else None
     try:
         value = float(text) * (hertz or seconds or np.nan)
     except ValueError:

@@ -98,7 +98,7 @@ def rows_of(lines: Sequence[str], start: int, delimiter: str) -> tuple[list[str]
     rows = [line for line in lines[start:] if line]
     # two equal rows are two rows, also where something stands between the first one and the others
     repeated = {
-        line for line in lines[:start] if not all(_is_cell(cell, False) or _is_cell(cell, True) for cell in row_of(line, delimiter))
+        line for line in lines[:start] if not all(_is_cell(cell, False) or _is_cell(cell, True) for cell in row_of(line, delimiter) if cell)
     }
     rows = [row.replace('"', "") for row in rows if row not in repeated]
     return rows, max(len(row_of(row, delimiter)) for row in rows[:_MOST_HEADER])
@@ -145,7 +145,8 @@ def _without_stamps(rows: list[str], delimiter: str, clocks: list[int], dates: l
             # a clock has nine decimals at most
             cells[i] = repr(round(days[i] * _DAY + value - begin[i], 9))
         for i in dates:
-            cells[i] = "0"
+            if i < len(cells):
+                cells[i] = "0"
         found.append((delimiter or " ").join(cells))
     return found
 

@@ -7,34 +7,16 @@ import re
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.signals.told_units import seconds_in
 
 #: Of a step: a time may stand this far from its place for other reasons than rounding.
 JITTER = 0.02
 
-#: Units of time, in seconds.
-SECONDS = {
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sekunde", "sekunden"), 1.0),
-    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "µs", "usec", "µsec", "microsecond", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), 1e-9),
-    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
-    **dict.fromkeys(("h", "hour", "hours"), 3600.0),
-}
-UNITS_OF_TIME = "s, ms, us, ns, min or h"
 #: Names of columns of times, also with more behind; ``t`` is one by itself, and ``T`` may be a temperature.
 _TIME = re.compile(
     r"\s*(?:(?:rel|elapsed|abs)\w*[ _])?(?:time|timestamp|zeit|zeitstempel|temps|abscissa|x[ _-]?value)(?![^\W_])", re.IGNORECASE
 )
 _SUFFIX = re.compile(r"_\(?(s|ms|us|µs|μs|ns|sec|msec|usec|min|h)\)?$", re.IGNORECASE)
-
-
-def seconds_per(unit: str) -> float | None:
-    """Return the seconds of a unit of time, 1 of an empty one; None of what is none.
-
-    >>> seconds_per("ms"), seconds_per("furlongs")
-    (0.001, None)
-    """
-    return SECONDS.get(unit.strip().lower().replace("μ", "µ").rstrip(".")) if unit.strip() else 1.0
 
 
 def time_unit(name: str, unit: str = "") -> str | None:
@@ -44,13 +26,13 @@ def time_unit(name: str, unit: str = "") -> str | None:
     ('ms', '', 'us', None)
     """
     plain = name.strip()
-    told = unit and seconds_per(unit) is not None
+    told = seconds_in(unit) is not None
     suffix = _SUFFIX.search(plain)
     base = plain[: suffix.start()] if suffix else plain
     if _TIME.match(plain) or base == "t" or (base == "T" and (told or suffix)):
         return unit.strip() or (suffix[1] if suffix else "")
     # oscilloscopes name the column by its unit
-    return plain if len(plain) > 2 and plain.lower() in SECONDS and not unit else None
+    return plain if len(plain) > 2 and seconds_in(plain) is not None and not unit else None
 
 
 class Irregular(Exception):

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io import text_columns
 from rcsa_ident.io.channels import Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.text_columns import LARGEST_TEXT, Meant, decoded
 from rcsa_ident.io.text_header import Head, columns_of, read_head, split, tells_rate, times_of
 from rcsa_ident.io.text_rows import STAMP, beside, first_numbers, lines_of, numbers_of, rows_of
-from rcsa_ident.io.time_base import UNITS_OF_TIME, Irregular, seconds_per, time_unit, uniform
+from rcsa_ident.io.time_base import Irregular, time_unit, uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
-from rcsa_ident.signals.told_units import is_untold, quantity_in, told_unit
+from rcsa_ident.signals.told_units import UNITS_OF_TIME, is_untold, quantity_in, seconds_in, volts_in
 from rcsa_ident.signals.verdict import RecordCode, assumed
 
 #: Units of times without a unit, which the rate decides; and as a share, rates that agree.
@@ -74,15 +74,23 @@ class OpenRecording:
     lossy: bool = False
 
     def of(
-        self, quantity: Quantity | None = None, names: Sequence[str] = ()
+        self, quantity: Quantity | None = None, names: Sequence[str] = (), sensitivity: float | None = None
     ) -> tuple[Quantity, tuple[OpenChannel, ...], tuple[Remark, ...]]:
         """Return the channels of one quantity, and what was assumed: those that are named, or all of the first quantity of acceleration,
         sound, force and motion.
 
+        Parameters
+        ----------
+        quantity : Quantity or None
+            What channels measure whose unit does not say it.
+        names : sequence of str
+        sensitivity : float or None
+            Signal per SI unit of such channels.
+
         Raises
         ------
         InputError
-            A name is not there, or nothing tells what a channel measures; the message names the option.
+            A name is not there, nothing tells what a channel measures, or its unit asks for the sensitivity; the message names the option.
         """
         present = [each.name for each in self.channels]
         chosen = tuple(self.channels[the_only(name, present, "")] for name in names) or self.channels
@@ -98,12 +106,18 @@ class OpenRecording:
         if not kept:
             found = listed([f"{each.name} [{each.unit}]" for each in chosen])
             raise InputError("quantity", found, f"a channel that measures {quantity}")
-        # lines stay where they are in any unit, amplitudes do not
-        units = tuple(
-            assumed(each.name, each.unit, f"{quantity} [{SI_UNITS[quantity]}]" if is_untold(each.unit) else f"{quantity}, in that unit,")
-            for each in kept
-            if each.quantity is None
-        )
+        unsaid = [each for each in kept if each.quantity is None]
+        if sensitivity is not None:
+            if not unsaid:
+                raise InputError("sensitivity", f"{sensitivity:g}", f"none: channel {kept[0].name} has the unit {kept[0].unit}")
+            gain = positive("sensitivity", sensitivity, "signal per SI unit")
+            return quantity, tuple(replace(each, samples=each.samples / gain) for each in kept), self.remarks
+        for each in unsaid:
+            if not is_untold(each.unit):
+                signal = "V" if volts_in(each.unit) is not None else each.unit
+                found = f"nothing, and channel {each.name} is in {each.unit}"
+                raise InputError("sensitivity", found, f"the sensor's [{signal} per SI unit]")
+        units = tuple(assumed(each.name, "", f"{quantity} [{SI_UNITS[quantity]}]") for each in unsaid)
         return quantity, kept, (*self.remarks, *units)
 
 
@@ -131,7 +145,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     notes: list[Remark] = []
 
     def meant(header: tuple[str, ...]) -> Meant:
-        own, every = columns_of(header, [""] * len(header), known_unit)
+        own, every = columns_of(header, [""] * len(header))
         places = [_place(name, own, header, str(path)) for name in names]
         units[:] = [every[i] for i in places]
         times = [i for i in times_of(own, every) if i not in places]
@@ -166,7 +180,7 @@ def _place(name: str, names: Sequence[str], texts: Sequence[str], where: str) ->
 def _seconds(name: str, unit: str, notes: list[Remark], where: str) -> float:
     """Seconds per unit of a column of times; one that nothing tells is said, but of a column 'time' in a campaign's table."""
     told = time_unit(name, unit)
-    seconds = seconds_per(told or unit)
+    seconds = seconds_in(told or unit or "s")
     if seconds is None:
         raise InputError(f"unit of column {name}", told or unit, UNITS_OF_TIME, where)
     if not told and not unit and name.lower() != "time":
@@ -192,7 +206,7 @@ def _tells_more(path: Path) -> bool:
     # what a spreadsheet would not take for a table: names in quotes around the delimiter, lines of several lengths
     unlike = len({line.count(delimiter) for line in text.splitlines()[start - 1 : start + 1]}) > 1
     cells = split(head[-1], delimiter) if head else []
-    names, units = columns_of(cells, [""] * len(cells), known_unit)
+    names, units = columns_of(cells, [""] * len(cells))
     return unlike or len(times_of(names, units)) > 1 or any(STAMP.fullmatch(cell) for cell in split(lines[start], delimiter))
 
 
@@ -218,7 +232,7 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
     cycles = [i for i in range(start, len(lines)) if _CYCLE.match(lines[i])]
     rows, width = rows_of(lines[: cycles[0] if cycles else None], start, delimiter)
     comma = comma or (delimiter != "," and any("," in row for row in rows))
-    head = read_head(lines[:start], delimiter, comma, width, wanted, known_unit, default_rate, where)
+    head = read_head(lines[:start], delimiter, comma, width, wanted, default_rate, where)
     values, stamped = numbers_of(rows, delimiter, comma, width, where)
     remarks = [Remark(RecordCode.ASSUMED, _FIRST_CYCLE.format(len(cycles) + 1))] if cycles else []
     if not head.named:
@@ -232,7 +246,7 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
         time = [0]
         remarks.append(Remark(RecordCode.ASSUMED, f"{head.names[0]}, which rises throughout, was taken as the time [s]"))
     if time:
-        rate, values = _timed(head, values, time[0], bool(stamped), told, remarks, where)
+        rate, values = _timed(head, values, time[0], bool(stamped), told, None if wanted else default_rate, remarks, where)
         _check_one_time(head, values, time[0], where)
     elif told is not None:
         rate = told
@@ -267,9 +281,17 @@ def _steps_of_one(values: FloatArray) -> bool:
 
 
 def _timed(
-    head: Head, values: FloatArray, place: int, stamped: bool, told: float | None, remarks: list[Remark], where: str
+    head: Head,
+    values: FloatArray,
+    place: int,
+    stamped: bool,
+    told: float | None,
+    asked: float | None,
+    remarks: list[Remark],
+    where: str,
 ) -> tuple[float, FloatArray]:
-    """The rate [Hz] that a column of times tells, and the rows at their places; samples that the times skip are NaN."""
+    """The rate [Hz] that a column of times tells, and the rows at their places; samples that the times skip are NaN. Uneven times are left
+    aside for a rate that the user asks for."""
     name, time = head.names[place], values[:, place]
     seconds = 1.0
     if not stamped:
@@ -289,8 +311,13 @@ def _timed(
         rate, index = uniform(time * seconds, told)
     except Irregular as error:
         even = _nearly_even(time * seconds)
+        if even is None and asked is not None:
+            words = f"the times in column {name} are uneven and were left aside: the rate that was told counts, {asked:.6g} Hz"
+            remarks.append(Remark(RecordCode.ASSUMED, words))
+            return asked, values
         if even is None:
-            raise InputError(f"column {name}", error.found, error.allowed, f"{where} row {error.row + 1}") from None
+            allowed = f"{error.allowed}, or for a recording without settings its rate [Hz], told"
+            raise InputError(f"column {name}", error.found, allowed, f"{where} row {error.row + 1}") from None
         rate, index = even, np.arange(values.shape[0])
         words = f"times that stand less than half a sample from their places were taken as even, {rate:.6g} Hz"
         remarks.append(Remark(RecordCode.ASSUMED, words))
@@ -320,8 +347,3 @@ def _nearly_even(time: FloatArray) -> float | None:
     place = np.arange(time.size)
     step, start = np.polyfit(place, time, 1)
     return float(1.0 / step) if np.abs(time - start - step * place).max() < 0.5 * step else None
-
-
-def known_unit(text: str) -> bool:
-    """Return whether a text is a unit; a number is none."""
-    return told_unit(text) is not None and any(letter.isalpha() for letter in text)

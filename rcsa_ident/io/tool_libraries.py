@@ -22,7 +22,7 @@ from rcsa_ident.cutting.outlines import key_of, missing
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
-from rcsa_ident.io.hsm_libraries import hsm_entries
+from rcsa_ident.io.hsm_libraries import hsm_entries, is_xml
 from rcsa_ident.io.library_entries import plain_entry, preset_notes
 from rcsa_ident.io.library_shapes import NotRead, check_type, iso_geometry, iso_shape_keys, shape_keys
 from rcsa_ident.io.setups import tooling_of
@@ -215,7 +215,7 @@ def _content(raw: bytes, where: str) -> Any:
     """The JSON of a library, out of its container where it is in one."""
     if raw[:4] == b"PK\x03\x04":
         raw = _unpacked(raw, where)
-    if raw[:200].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
+    if is_xml(raw):
         return hsm_entries(raw, where)
 
     def refuse(text: str) -> NoReturn:

@@ -38,6 +38,8 @@ class FlangeMachine(Machine):
         Whether nothing at all is known beyond `known`, as of a measurement.
     axial : AxialFlange or None
         What an axial tap showed.
+    assumed : tuple of str
+        What was remarked as its file was read.
 
     Examples
     --------
@@ -55,6 +57,7 @@ class FlangeMachine(Machine):
     name: str = "flange"
     ends: bool = False
     axial: AxialFlange | None = None
+    assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.flanges or not 0.0 <= self.known[0] < self.known[1]:
@@ -78,7 +81,7 @@ class FlangeMachine(Machine):
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """What speaks against everything that is computed with it: frequencies that lie too far apart, an axis that feeds energy in."""
-        found: list[str] = []
+        found = [*self.assumed]
         for flange in self.flanges:
             if isinstance(flange, MeasuredFlange):
                 low, high = max(flange.band[0], self.known[0]), min(flange.band[1], self.known[1])

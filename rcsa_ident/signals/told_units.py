@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable
 from functools import lru_cache
 from math import pi
 from typing import NamedTuple
@@ -21,6 +22,7 @@ Powers = tuple[int, int, int, int, int, int]
 _NONE: Powers = (0, 0, 0, 0, 0, 0)
 _METRE: Powers = (0, 1, 0, 0, 0, 0)
 _SECOND: Powers = (0, 0, 1, 0, 0, 0)
+_PER_SECOND: Powers = (0, 0, -1, 0, 0, 0)
 _VELOCITY: Powers = (0, 1, -1, 0, 0, 0)
 _ACCELERATION: Powers = (0, 1, -2, 0, 0, 0)
 _FORCE: Powers = (1, 1, -2, 0, 0, 0)
@@ -30,24 +32,27 @@ _ANGLE: Powers = (0, 0, 0, 0, 1, 0)
 _FREQUENCY: Powers = (0, 0, -1, 0, 0, 1)
 _ANGULAR: Powers = (0, 0, -1, 0, 1, 0)
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "da": 1e1, "h": 1e2, "k": 1e3, "M": 1e6, "G": 1e9}
+_IN_WORDS = {"nano": 1e-9, "micro": 1e-6, "milli": 1e-3, "kilo": 1e3}
 #: Symbols: how many SI units each is, its powers, and the prefixes that it may have.
-_SYMBOLS: dict[str, tuple[float, Powers, tuple[str, ...]]] = {
+_SYMBOLS: dict[str, tuple[float, Powers, Iterable[str]]] = {
     "m": (1.0, _METRE, ("n", "u", "m", "c", "d", "k")),
-    **dict.fromkeys(("meter", "metre"), (1.0, _METRE, ())),
+    **dict.fromkeys(("meter", "metre"), (1.0, _METRE, _IN_WORDS)),
     **dict.fromkeys(("micron", "microns"), (1e-6, _METRE, ())),
     **dict.fromkeys(("in", "inch", "inches"), (_INCH, _METRE, ())),
     **dict.fromkeys(("mil", "mils", "thou"), (1e-3 * _INCH, _METRE, ())),
     **dict.fromkeys(("ft", "foot", "feet"), (12.0 * _INCH, _METRE, ())),
     "s": (1.0, _SECOND, ("n", "u", "m")),
-    **dict.fromkeys(("sec", "second", "seconds"), (1.0, _SECOND, ())),
-    "min": (60.0, _SECOND, ()),
-    "h": (3600.0, _SECOND, ()),
+    "sec": (1.0, _SECOND, ("n", "u", "m")),
+    **dict.fromkeys(("secs", "second", "seconds", "sekunde", "sekunden"), (1.0, _SECOND, _IN_WORDS)),
+    **dict.fromkeys(("min", "minute", "minutes"), (60.0, _SECOND, ())),
+    **dict.fromkeys(("h", "hour", "hours"), (3600.0, _SECOND, ())),
     "ips": (_INCH, _VELOCITY, ()),
     "g": (_GRAVITY, _ACCELERATION, ("m", "u")),
     **dict.fromkeys(("gn", "g_n", "g0", "G"), (_GRAVITY, _ACCELERATION, ())),
     "Gal": (1e-2, _ACCELERATION, ("m",)),
     "kg": (1.0, (1, 0, 0, 0, 0, 0), ()),
     "N": (1.0, _FORCE, ("u", "m", "c", "d", "da", "k", "M")),
+    **dict.fromkeys(("newton", "newtons"), (1.0, _FORCE, _IN_WORDS)),
     **dict.fromkeys(("kgf", "kp"), (_GRAVITY, _FORCE, ())),
     "gf": (1e-3 * _GRAVITY, _FORCE, ()),
     **dict.fromkeys(("lbf", "lb", "lbs"), (_POUND, _FORCE, ())),
@@ -59,10 +64,10 @@ _SYMBOLS: dict[str, tuple[float, Powers, tuple[str, ...]]] = {
     "Pa": (1.0, _PRESSURE, ("u", "m", "h", "k", "M", "G")),
     "bar": (1e5, _PRESSURE, ("u", "m")),
     "V": (1.0, _VOLT, ("n", "u", "m", "k")),
-    **dict.fromkeys(("volt", "volts"), (1.0, _VOLT, ())),
+    **dict.fromkeys(("volt", "volts"), (1.0, _VOLT, _IN_WORDS)),
     "rad": (1.0, _ANGLE, ("u", "m")),
     **dict.fromkeys(("deg", "degree", "degrees", "°"), (pi / 180.0, _ANGLE, ())),
-    "Hz": (1.0, _FREQUENCY, ("k", "M", "G")),
+    "Hz": (1.0, _FREQUENCY, ("m", "k", "M", "G")),
     "hertz": (1.0, _FREQUENCY, ()),
     "cps": (1.0, _FREQUENCY, ()),
     **dict.fromkeys(("rpm", "cpm"), (1.0 / 60.0, _FREQUENCY, ())),
@@ -70,6 +75,10 @@ _SYMBOLS: dict[str, tuple[float, Powers, tuple[str, ...]]] = {
 }
 #: Units of FRFs in the words of messages.
 UNITS_ALLOWED = "motion over force or its inverse, as m/N, um/N, mm/N, in/lbf, m/s/N, m/s^2/N, g/N, 1/kg, N/m"
+#: Units of times, and of sampling rates, in the words of messages.
+UNITS_OF_TIME, UNITS_OF_RATES = "s, ms, us, ns, min or h", "Hz, kHz, MHz, S/s, kS/s or MS/s"
+#: Samples per second behind their prefix, which may stand alone, as in 25.6 k; a rate in MHZ is none in mHz.
+_SAMPLES = re.compile(r"(?<!m)(?:(?i:S(?:a|amples?)?/s(?:ec(?:ond)?)?|sps|(?<=^k))|HZ)$")
 #: Letters of a unit, at most.
 _LONGEST = 80
 #: What stands in the place of a unit where a file says none.
@@ -151,7 +160,7 @@ def told_unit(text: str) -> Unit | None:
     >>> told_unit("furlong"), told_unit("m/s*s"), told_unit("NM")
     (None, None, None)
     """
-    plain = unicodedata.normalize("NFKC", text.replace("·", "*").replace("º", "°")).replace("μ", "u").replace("−", "-")
+    plain = unicodedata.normalize("NFKC", text.strip().rstrip(".").replace("·", "*").replace("º", "°")).replace("μ", "u").replace("−", "-")
     tokens, place = list[re.Match[str]](), len(plain) if len(plain) > _LONGEST else 0
     while place < len(plain):
         if plain[place].isspace():
@@ -168,6 +177,11 @@ def told_unit(text: str) -> Unit | None:
     tokens.reverse()
     unit = _product(tokens)
     return None if tokens else unit
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit; a number is none."""
+    return told_unit(text) is not None and any(letter.isalpha() for letter in text)
 
 
 def quotient(motion: str, force: str) -> str:
@@ -209,7 +223,7 @@ def _factor(tokens: list[re.Match[str]]) -> Unit | None:
 def _every() -> dict[str, Unit]:
     """All symbols with their prefixes; one that stands in the table itself is not another one with a prefix."""
     found = {
-        prefix + symbol: Unit(_PREFIXES[prefix] * factor, powers)
+        prefix + symbol: Unit((_PREFIXES | _IN_WORDS)[prefix] * factor, powers)
         for symbol, (factor, powers, prefixes) in _SYMBOLS.items()
         for prefix in prefixes
     }
@@ -259,6 +273,23 @@ def hertz_in(text: str) -> float | None:
     """Return hertz per unit of a frequency or an angular frequency; 1/s could be either and is neither."""
     hertz, angular = _of(text, _FREQUENCY), _of(text, _ANGULAR)
     return hertz if angular is None else angular / (2.0 * pi)
+
+
+def rate_in(text: str) -> float | None:
+    """Return hertz per unit of a sampling rate: hertz, samples per second, 1/s, or a prefix alone, as in 25.6 k.
+
+    Examples
+    --------
+    >>> rate_in("kS/s"), rate_in("MSps"), rate_in("1/s"), rate_in("ms/s")
+    (1000.0, 1000000.0, 1.0, None)
+    """
+    plain = _SAMPLES.sub("Hz", text.strip())
+    return hertz_in(plain) if plain.lower().endswith(("hz", "hertz")) else _of(plain, _PER_SECOND)
+
+
+def seconds_in(text: str) -> float | None:
+    """Return seconds per unit of a time."""
+    return _of(text, _SECOND)
 
 
 def radians_in(text: str) -> float | None:

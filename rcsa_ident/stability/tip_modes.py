@@ -17,8 +17,9 @@ from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.plausibility import TIP_DAMPING, TIP_FREQUENCY, TIP_STIFFNESS, remarks_of
+from rcsa_ident.plausibility import MODE_STIFFNESS, TIP_DAMPING, TIP_FREQUENCY, TIP_STIFFNESS, remarks_of
 from rcsa_ident.remarks import Remark
+from rcsa_ident.shown import Saved
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
@@ -41,7 +42,7 @@ DAMPED_OUTSIDE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TipModes(PoleResidue):
+class TipModes(PoleResidue, Saved):
     """The tip's receptance in r machine directions as damped modes; along the edge they may have a shape.
 
     Parameters
@@ -131,11 +132,14 @@ class TipModes(PoleResidue):
     def remarks(self) -> tuple[Remark, ...]:
         """What is unusual about the modes, as a wrong unit would make it: the highest frequency, damping ratios, the softest stiffness."""
         frequency, damping = np.abs(self.pole), -self.pole.real / np.abs(self.pole)
-        compliance = np.linalg.norm(2.0 * np.real(-self.outputs * self.inputs.T / self.pole), axis=0)
+        # along a mode's own direction, whatever it is
+        compliance = np.abs(np.sum(2.0 * np.real(-self.outputs[:3] * self.inputs.T[:3] / self.pole), axis=0))
         values = [("highest natural frequency of the tip", TIP_FREQUENCY, float(frequency.max()))]
         values += [("damping ratio", TIP_DAMPING, float(end)) for end in np.unique(damping)[[0, -1]]]
         if compliance.any():
             values.append(("stiffness of the tip's softest mode", TIP_STIFFNESS, 1.0 / float(compliance.max())))
+        if compliance.all() and compliance.size > 1:
+            values.append(("stiffness of the tip's stiffest mode", MODE_STIFFNESS, 1.0 / float(compliance.min())))
         return tuple(dict.fromkeys(remarks_of(values)))
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,23 @@ MOST_NODES = 2e10
 _DRAWN = 3e7
 #: Bytes of a line: two segments and their number.
 _LINE = 16 * _ROOM + 2
+
+
+class Surface(NamedTuple):
+    """A closed surface of triangles.
+
+    Parameters
+    ----------
+    points : array, shape (v, 3) [m]
+    faces : array of int, shape (f, 3)
+        Counterclockwise from outside.
+    remarks : tuple of Remark
+        What was remarked as its file was read.
+    """
+
+    points: FloatArray
+    faces: np.ndarray
+    remarks: tuple[Remark, ...] = ()
 
 
 def memory_of(size: FloatArray, cell: float) -> int:

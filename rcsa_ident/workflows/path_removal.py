@@ -13,7 +13,7 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.machining_setup import BareCutter, Tooling
 from rcsa_ident.shown import Shown
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.toolpath.dexel import DexelField, memory_of
+from rcsa_ident.toolpath.dexel import DexelField, Surface, memory_of
 from rcsa_ident.toolpath.engagement import PathEngagement, engagement_along
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import Sweep
@@ -30,9 +30,8 @@ _NOTHING = 1e-12
 #: Depth to which something that does not cut may stand in material [m].
 _TOUCH = 1e-5
 
-#: A block's lower and upper corner [m], or points [m] and triangles of a closed surface.
+#: A block's lower and upper corner [m].
 Block = tuple[FloatArray, FloatArray]
-Surface = tuple[FloatArray, np.ndarray]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -96,7 +95,7 @@ def field_of(tooling: Tooling, block: Block | None = None, surface: Surface | No
     ----------
     tooling : Tooling
     block : pair of arrays, shape (3,) [m]
-    surface : pair of arrays, shape (v, 3) [m] and (f, 3)
+    surface : Surface
         Instead of the block.
     cell : float or None [m]
         Between lines of material, by default a twentieth of the tool's radius (`default_cell`).
@@ -112,15 +111,15 @@ def field_of(tooling: Tooling, block: Block | None = None, surface: Surface | No
         low, high = (np.asarray(corner, dtype=float) for corner in block)
     else:
         assert surface is not None
-        low, high = surface[0].min(axis=0), surface[0].max(axis=0)
+        low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     cell = default_cell(solid_of(tooling).radius, high - low) if cell is None else positive("cell", cell, "m")
     if memory_of(high - low, cell) > _MOST_MEMORY:
         found = f"{1e3 * cell:g} mm, for which the stock takes {memory_of(high - low, cell) / 1e9:.3g} GB"
         raise InputError("cell", found, f"cells for which it takes at most {_MOST_MEMORY / 1e9:g} GB")
     if surface is None:
         return DexelField.block(low, high, cell)
-    field = DexelField.from_mesh(*surface, cell)
-    field.remarks = getattr(surface, "remarks", ())
+    field = DexelField.from_mesh(surface.points, surface.faces, cell)
+    field.remarks = surface.remarks
     return field
 
 

@@ -76,5 +76,8 @@ def test_tested_cuts_are_read_as_the_commands_read_them(client):
     cuts = client.tested_cuts(plain).cuts
     assert [(c.spindle_speed_rpm, c.axial_depth_mm, c.verdict) for c in cuts] == [(8000.0, 0.5, "stable"), (9000.0, 3.0, "chatter")]
     assert client.tested_cuts(quoted).cuts == cuts
+    assert client.tested_cuts(plain.replace("\n", ",7\n").replace("verdict,7", "verdict,note")).warnings == [
+        "the column note is left aside"
+    ]
     assert refused(422, client.tested_cuts, plain.replace("8000", "5")).errors[0].field == "cuts[0].spindle_speed_rpm"
     assert "verdict" in refused(422, client.tested_cuts, plain.replace("Chatter", "loud")).errors[0].field

@@ -265,5 +265,5 @@ def test_the_options_of_the_command_are_described(http):
     """Every option of the command is one of the query."""
     described = http.get("/openapi.json").json()["paths"]["/v1/listen"]["post"]
     names = {parameter["name"] for parameter in described["parameters"]}
-    assert {"channel", "quantity", "teeth", "speed_rpm", "speeds_from", "speeds_to", "rate_hz"} <= names
+    assert {"channel", "quantity", "teeth", "speed_rpm", "speeds_from", "speeds_to", "rate_hz", "sensitivity"} <= names
     assert set(described["requestBody"]["content"]) >= {"audio/wav", "multipart/form-data", "application/octet-stream"}

@@ -84,6 +84,14 @@ def test_a_recorders_file_with_units_needs_no_setting(tmp_path):
     assert "--quantity" in refused.output
     with h5py.File(path, "r+") as file:
         for name in ("x", "y"):
+            file[name].attrs["unit"] = "mV"
+    refused = run(path, "--quantity", "acceleration")
+    assert refused.exit_code == 2
+    said = " ".join(refused.stderr.split())
+    assert "--sensitivity: found nothing, and channel x is in mV, allowed is the sensor's [V per SI unit]" in said
+    assert run(path, "--quantity", "acceleration", "--sensitivity", 0.0102).exit_code == 0
+    with h5py.File(path, "r+") as file:
+        for name in ("x", "y"):
             file[name].attrs["unit"] = "g"
     answer = json.loads(run(path, "--json").stdout)
     assert (answer["quantity"], answer["channels"], answer["verdict"]) == ("acceleration", ["x", "y"], "stable")

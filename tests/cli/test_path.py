@@ -44,7 +44,7 @@ def test_a_slot_is_told_and_written(slot, tmp_path):
     middle = [row for row in rows if float(row["x_mm"]) == 20.0]
     assert {(row["entry_angle_deg"], row["exit_angle_deg"]) for row in middle} == {("0", "180")}
     assert diameter == pytest.approx(round(diameter, 1), rel=1e-3)
-    points, _ = read_mesh(part)
+    points = read_mesh(part).points
     assert 1e3 * np.ptp(points, axis=0) == pytest.approx([40.0, 30.0, 12.0], abs=0.01)
     assert plot.read_bytes().startswith(b"\x89PNG")
 

@@ -40,6 +40,14 @@ def noisy(h, share, seed=3):
     return h + share * np.abs(h).max() * (rng.standard_normal(h.size) + 1j * rng.standard_normal(h.size))
 
 
+@pytest.mark.parametrize("damping", [0.005, 0.03])
+@pytest.mark.parametrize(("degrees", "said"), [(40.0, False), (-40.0, False), (51.0, True), (-51.0, True)])
+def test_a_phase_of_45_degrees_makes_an_frf_that_is_none_of_a_driving_point(damping, degrees, said):
+    """Whatever the mode: what is given back is a matter of the phase alone."""
+    _, remarks = judged(FREQUENCY, mode(900.0, 2e7, damping) * np.exp(1j * np.radians(degrees)))
+    assert any("no driving point has" in remark for remark in remarks) == said
+
+
 @pytest.mark.parametrize("share", [0.0, 1e-3])
 @pytest.mark.parametrize("tip", TIPS)
 def test_a_passive_frf_is_left_alone(tip, share):

@@ -123,6 +123,13 @@ def test_units_stand_in_a_line_or_in_the_names(tmp_path, names, units, above, ho
     assert all("0 dB" in remark for remark in read_back(path).remarks)
 
 
+def test_rows_may_be_indented(tmp_path):
+    """Found by fuzzing: between tabs the indent was a cell more than the first row has."""
+    path = tmp_path / "x.txt"
+    path.write_text(text(*NAMES[0], "m/N", "Hz", ("\t", ".")).replace("\n", "\n \t"))
+    read_back(path)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
 def test_encodings(tmp_path, encoding):
     path = tmp_path / "x.txt"

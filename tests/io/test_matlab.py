@@ -15,7 +15,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.open_recording import open_recording
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.fixtures.hostile_matlab import HOSTILE, matrix
+from tests.fixtures.hostile_matlab import HOSTILE, matrix, padded
+from tests.fixtures.hostile_matlab import file as file_of
 from tests.fixtures.recording_formats import mat73
 
 X = Sensor("x", Quantity.TRIGGER)
@@ -291,6 +292,25 @@ def test_other_classes_of_version_5(tmp_path, value):
         read_recording(tmp_path / "cut.mat", (X,))
     # beside it a channel is read all the same
     np.testing.assert_array_equal(read_recording(tmp_path / "cut.mat", (Y,)).samples[:, 0], VALUES)
+
+
+@pytest.mark.parametrize("newer", [False, True])
+def test_a_timetable_is_refused_by_what_to_write(tmp_path, newer):
+    """As MATLAB lays its objects out: name, system of types and class behind the flags; or an attribute of HDF5."""
+    path = tmp_path / "r.mat"
+    if newer:
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file["TT"] = np.zeros((1, 6), np.uint32)
+            file["TT"].attrs["MATLAB_class"] = np.bytes_("timetable")
+    else:
+        texts = b"".join(padded(1, text) for text in (b"TT", b"MCOS", b"timetable"))
+        body = padded(6, struct.pack("<II", 17, 0)) + texts
+        path.write_bytes(file_of(struct.pack("<II", 14, len(body)) + body))
+    for read in (lambda: open_recording(path, (), 1000.0), lambda: signals(path, "TT", rate=1000.0)):
+        with pytest.raises(
+            InputError, match=r"channel TT: found values of class timetable, .* of a timetable TT write vectors: t = seconds"
+        ):
+            read()
 
 
 def test_version_4_says_how_to_save(tmp_path):

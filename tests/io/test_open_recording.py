@@ -122,7 +122,7 @@ def test_what_cannot_be_told_is_named(tmp_path, lines, field):
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if name.startswith(("hdf5", "tdms", "uff", "mat", "parquet"))])
 def test_formats_with_named_channels_list_them(tmp_path, name):
-    """Without names and without units: all channels, at the user's word for what they measure."""
+    """Without names, and without units or in volts: all channels, at the user's word for what they measure."""
     suffix, write, _, _ = FORMATS[name]
     path = tmp_path / f"record{suffix}"
     write(path, 2000.0, {"a": X, "b": Y})
@@ -130,7 +130,7 @@ def test_formats_with_named_channels_list_them(tmp_path, name):
     assert opened.rate == 2000.0
     with pytest.raises(InputError, match="no unit in the file"):
         opened.of()
-    quantity, channels, _ = opened.of(Quantity.ACCELERATION)
+    quantity, channels, _ = opened.of(Quantity.ACCELERATION, sensitivity=1.0)
     assert quantity is Quantity.ACCELERATION
     assert sorted(each.name for each in channels) == ["a", "b"]
     for each in channels:

@@ -16,7 +16,8 @@ from tests.fixtures.paths import ROOT
 _BETWEEN_KEYS = re.compile(
     r"finite numbers? \[(deg|mm|wavelengths)\]|"
     r"radial_depth_mm: found [\d.e+]+, allowed is a finite number above 0 and at most|the distance from the tip from 0 to|"
-    r"angles above 0 that add up|on a tool that is|above entry_angle_deg|at most half of the diameter|"
+    r"angles above 0 that add up|stiffness of the tip|cosines of the angles|on a tool that is|above entry_angle_deg|"
+    r"at most half of the diameter|"
     r"a list of \d+ of them, one a tooth|an amplitude below the wavelength|offsets for the shape table|"
     r"(entry|exit)_angle_deg: found nothing|one way to tell the engagement|above y_from_mm|a block that the cutter reaches|"
     r"needs the map of its engagement|engagement map: found no such file|never fall \[m\]|0 <= start <= end|a cut in which some tooth cuts|"
@@ -24,7 +25,7 @@ _BETWEEN_KEYS = re.compile(
     r"below the outer diameter|at most [\d.e+]+ \[mm\^[24]\]|or neither|material: found the text|tooling: found the text|"
     r"materials\.\S+: found nothing|shaft's length|a number other than 0|one table \[sensors|"
     r"above from_hz|where there are cuts|at least one tooling|hammer tests \[\[frfs\]\], or both|"
-    r"a point of the tool-holder, tip or mm|one or more speeds|\[\[z\]\] or several of them|"
+    r"a point of the tool-holder, tip or mm|one or more speeds|\[\[modes\]\] or several of them|"
     r"runout_mm|a loss factor|\.engagement: found|"
     r"stickout|insertion|softening|settling|from.*to|without it the cut keeps its speed|of change in each pass|"
     r"times the value|of a value that is not given|radial_mpa|a vector of three that is not zero|then a higher one|are these millimetres"

@@ -126,12 +126,12 @@ DIALECTS: dict[str, tuple[str, str, str]] = {
     ),
     "Siglent": (
         "Record Length,Analog:400\nSample Interval,3.90625e-05\nVertical Scale,CH1:0.5\nSource,CH1,CH2\nSecond,Volt,Volt\n" + PLAIN,
-        "Volt V",
-        "Volt V",
+        "Volt Volt",
+        "Volt Volt",
     ),
-    "Rigol": ("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-6.0e-03,3.906250e-05\n" + NUMBERS, "CH1 V", "CH2 V"),
+    "Rigol": ("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-6.0e-03,3.906250e-05\n" + NUMBERS, "CH1 Volt", "CH2 Volt"),
     "Rigol, by one line": ("Time(s),CH1(V),CH2(V),t0 = 0s, tInc = 3.906250e-05,\n" + PLAIN, "CH1 V", "CH2 V"),
-    "Keysight": ("x-axis,1,2\nsecond,Volt,Volt\n" + PLAIN, "1 V", "2 V"),
+    "Keysight": ("x-axis,1,2\nsecond,Volt,Volt\n" + PLAIN, "1 Volt", "2 Volt"),
     "LeCroy": (
         "LECROYWS3024,12345,Waveform\nSegments,1,SegmentSize,400\nSegment,TrigTime,TimeSinceSegment1\n#1,01-Feb-2024 12:00:00,0\n"
         "Time,acc (V),force (V)\n" + PLAIN,
@@ -233,7 +233,7 @@ def test_a_dialect_is_read_to_the_last_digit(tmp_path, name, encoding):
 def sensor(told: str) -> Sensor:
     name, unit = told.rsplit(" ", 1)
     quantity = {"N": Quantity.FORCE, "kN": Quantity.FORCE, "um": Quantity.DISPLACEMENT}.get(unit, Quantity.ACCELERATION)
-    return Sensor(name, quantity, Dof.X, 0.1 if unit in ("V", "mV") else 1.0)
+    return Sensor(name, quantity, Dof.X, 0.1 if unit in ("V", "mV", "Volt") else 1.0)
 
 
 @pytest.mark.parametrize("name", [name for name, (_, *told) in DIALECTS.items() if told[0] != told[1]])
@@ -337,12 +337,28 @@ def test_whole_numbers_in_front_hide_no_decimal_comma(tmp_path):
     assert [each.samples.tolist() for each in open_recording(path).channels] == [[0.0, G, 0.5 * G, 2.0 * G], [1.0, 2.0, 3.0, 4.5]]
 
 
-def test_equal_rows_are_kept_with_a_decimal_comma_as_well(tmp_path):
-    """Found by fuzzing: a row above the table by itself was taken for a header that comes again, and none was left."""
+@pytest.mark.parametrize("gap", ["1,7", ""])
+def test_a_row_with_decimal_commas_above_the_table_is_no_header_that_comes_again(tmp_path, gap):
+    """Found by fuzzing: a row above the table by itself, also one with an empty cell, was taken for a header, and none was left."""
     path = tmp_path / "record.txt"
-    path.write_text("a;b;c\n0,002;1,7;2\nnote\n0,002;1,7;2\n0,002;1,7;2\n0,003;1,8;3\n")
-    found = open_recording(path, default_rate=1000.0)
-    assert [each.samples.tolist() for each in found.channels] == [[0.002, 0.002, 0.003], [1.7, 1.7, 1.8], [2.0, 2.0, 3.0]]
+    path.write_text(f"a;b;c\n0,002;{gap};2\nnote\n0,002;{gap};2\n0,002;{gap};2\n0,003;1,8;3\n")
+    found = {each.name: each.samples for each in open_recording(path, default_rate=1000.0).channels}
+    np.testing.assert_array_equal(found["a"], [0.002, 0.002, 0.003])
+    np.testing.assert_array_equal(found["b"], [1.7, 1.7, 1.8] if gap else [np.nan, np.nan, 1.8])
+    np.testing.assert_array_equal(found["c"], [2.0, 2.0, 3.0])
+
+
+def test_a_row_that_ends_before_its_date_is_read(tmp_path):
+    """Found by fuzzing."""
+    (tmp_path / "record.csv").write_text("clock,acc (g),day\n0:00:01,1,2024-01-01\n0:00:02,2\n0:00:03,4,2024-01-01\n")
+    opened = open_recording(tmp_path / "record.csv")
+    assert (opened.rate, opened.channels[0].samples.tolist()) == (1.0, [G, 2.0 * G, 4.0 * G])
+
+
+def test_a_line_of_quotes_alone_says_nothing(tmp_path):
+    """Found by fuzzing: between blanks such a line has no cell."""
+    (tmp_path / "record.txt").write_text('"\n1.,\n1\n3\n')
+    assert open_recording(tmp_path / "record.txt", default_rate=1000.0).channels[0].samples.tolist() == [1.0, 1.0, 3.0]
 
 
 def test_empty_cells_are_lost_samples_and_no_row_goes(tmp_path):

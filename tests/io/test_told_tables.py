@@ -2,8 +2,11 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
+import pyarrow
 import pytest
+from pyarrow import parquet
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
@@ -98,6 +101,18 @@ def test_what_is_not_told_is_asked_for(tmp_path, text, words):
     assert "cut.csv" in str(caught.value)
 
 
+def test_uneven_times_are_left_aside_for_a_rate_that_is_told(tmp_path):
+    """Devices of a few dollars write when they come to it; a campaign's rate is no word about this file."""
+    path = tmp_path / "tap.csv"
+    path.write_text("time_s,acc (g)\n" + "".join(f"{t},{k % 3}\n" for k, t in enumerate((0.0, 0.003, 0.006, 0.011, 0.0119, 0.02))))
+    opened = open_recording(path, (), 333.0)
+    assert (opened.rate, opened.channels[0].samples.size) == (333.0, 6)
+    assert any("column time_s are uneven and were left aside: the rate that was told counts, 333 Hz" in said for said in opened.remarks)
+    for read in (lambda: open_recording(path), lambda: read_recording(path, (Sensor("acc", Quantity.ACCELERATION, Dof.X),), 333.0)):
+        with pytest.raises(InputError, match="whole multiples of the sampling interval"):
+            read()
+
+
 def test_a_channel_that_stands_still_is_there(tmp_path):
     still = FORCE.copy()
     still[:, 2] = 0.0
@@ -134,6 +149,26 @@ def test_a_unit_that_nobody_knows_is_the_sensitivitys_business(tmp_path):
     (tmp_path / "cut.csv").write_text(table(unit="pC"))
     recording = read_recording(tmp_path / "cut.csv", with_sensitivity(2.0))
     np.testing.assert_allclose(recording.samples, 0.5 * FORCE[:, :2], rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["name of a MATLAB variable", "name of a column", "field of a column"])
+def test_no_format_takes_an_unknown_unit_as_si(tmp_path, kind):
+    """Formats without a place for units tell them by names; Parquet may by a field's metadata."""
+    name, samples = "a (counts)", np.arange(50) % 7.0
+    path = tmp_path / ("a.mat" if "MATLAB" in kind else "a.parquet")
+    if "MATLAB" in kind:
+        # as a structure of HDF5, whose names are free
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file[name] = samples[None]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    else:
+        name = name if "name" in kind else "a"
+        field = pyarrow.field(name, pyarrow.float64(), metadata=None if "name" in kind else {"unit": "counts"})
+        parquet.write_table(pyarrow.table([samples], schema=pyarrow.schema([field])), path)
+    sensor = Sensor(name, Quantity.ACCELERATION, Dof.X)
+    with pytest.raises(InputError, match=r"sensitivity: found 1.0, allowed is .*\[counts per SI unit\]"):
+        read_recording(path, (sensor,), 1000.0)
+    np.testing.assert_allclose(read_recording(path, (replace(sensor, sensitivity=2.0),), 1000.0).samples[:3, 0], [0.0, 0.5, 1.0])
 
 
 def test_a_campaign_never_takes_an_unknown_unit_as_si(tmp_path):

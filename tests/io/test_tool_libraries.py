@@ -20,7 +20,7 @@ from rcsa_ident.io.tool_libraries import Assumptions, file_names, import_tools, 
 from rcsa_ident.machining_setup import BareCutter
 from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
-from tests.fixtures.tool_library import END_MILL, end_mill, inches, library
+from tests.fixtures.tool_library import END_MILL, HSM, end_mill, inches, library
 
 
 def imported(*entries, **assumed):
@@ -236,28 +236,26 @@ def test_a_text_that_is_no_number_is_refused_by_its_words(told):
     assert "geometry.DC: found" in found.reason
 
 
-HSM = """<?xml version="1.0" encoding="UTF-8"?>
-<tool-library version="1.7" xmlns="http://example.org/toollibrary">
- <tool guid="{1}" type="bull nose end mill" unit="inches" version="1.4">
-  <description>half inch, R 0.03</description>
-  <material name="carbide"/>
-  <body diameter="0.5" number-of-flutes="3" corner-radius="0.03" flute-length="1" overall-length="3" shaft-diameter="0.5"/>
-  <holder><section diameter="1" length="2"/></holder>
-  <motion spindle-rpm="9000" cutting-feedrate="60"/>
- </tool>
- <tool type="drill" unit="millimeters"><description>drill</description><body diameter="5"/></tool>
-</tool-library>
-"""
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_xml_of_hsmworks(encoding):
+    """As the programs write it, in UTF-16, and as others do; with presets, and cones of the holder from the tool's side up."""
     cutter, drill = import_tools(HSM.encode(encoding), "L.hsmlib")
     assert drill.reason == "a drill, not a milling tool"
     assert (cutter.name, cutter.tooling.cutter.teeth) == ("half inch, R 0.03", 3)
     assert 1e3 * cutter.tooling.cutter.diameter == pytest.approx(12.7, rel=1e-12)
     assert 1e3 * cutter.tooling.cutter.corner_radius == pytest.approx(0.762, rel=1e-12)
     assert "preset of the library, where an advice may start: 9000 rev/min, 1524 mm/min" in cutter.notes
+    assert "preset Aluminium, where an advice may start: 12000 rev/min, 1016 mm/min" in cutter.notes
+    assert shape(cutter.tooling.assembly.holder) == [
+        (12.7, 25.4, 31.75, 12.7), (12.7, 31.75, 31.75, 12.7), (25.4, 31.75, 31.75, 0.0), (25.4, 50.8, 50.8, 0.0)
+    ]  # fmt: skip
+
+
+def test_feeds_of_hsmworks_per_revolution_are_no_feeds_per_minute():
+    cutter, _ = import_tools(HSM.replace("<motion ", '<motion feed-mode="per-revolution" ').encode("utf-16"), "L.hsmlib")
+    assert [note for note in cutter.notes if "preset" in note] == [
+        "preset Aluminium, where an advice may start: 12000 rev/min, 1016 mm/min"
+    ]
 
 
 @pytest.mark.parametrize(

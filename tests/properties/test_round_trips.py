@@ -129,7 +129,7 @@ def test_robots(name, factor):
 def test_surfaces(folder, kind, low, size):
     points, faces = box(low, low + size)
     write_mesh(folder / f"m.{kind}", points, faces)
-    found, corners = read_mesh(folder / f"m.{kind}")
+    found, corners, _ = read_mesh(folder / f"m.{kind}")
     assert len(corners) == len(faces)
     # single precision, in millimetres
     np.testing.assert_allclose([found.min(axis=0), found.max(axis=0)], [low, low + size], rtol=0.0, atol=2e-7)

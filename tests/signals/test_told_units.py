@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.signals.recording import Quantity
-from rcsa_ident.signals.told_units import frf_unit, hertz_in, is_untold, quantity_in, told_unit, volts_in
+from rcsa_ident.signals.told_units import frf_unit, hertz_in, is_untold, quantity_in, rate_in, seconds_in, told_unit, volts_in
 
 GRAVITY = 9.80665
 
@@ -63,6 +63,11 @@ def test_what_is_no_unit_of_an_frf(text):
 def test_other_quantities():
     assert (hertz_in("kHz"), hertz_in("KHz"), hertz_in("rpm"), hertz_in("1/s"), hertz_in("s")) == (1e3, 1e3, 1.0 / 60.0, None, None)
     assert hertz_in("rad/s") == pytest.approx(0.5 / np.pi)
-    assert [told_unit(text).factor for text in ("ms", "ns", "min")] == [1e-3, 1e-9, 60.0]
-    assert (volts_in("mV"), volts_in("MV"), volts_in("V/g")) == (1e-3, 1e-3, None)
+    assert [seconds_in(text) for text in ("ms", "nsec", "min", "µs", "Sekunden", "sec.", "Milliseconds", "N", "")] == [
+        1e-3, 1e-9, 60.0, 1e-6, 1.0, 1.0, 1e-3, None, None
+    ]  # fmt: skip
+    rates = ["S/s", "kSa/s", "MS/s", "ksps", "samples/sec", "MHZ", "k", "s^-1", "mHz"]
+    assert [rate_in(text) for text in rates] == [1.0, 1e3, 1e6, 1e3, 1.0, 1e6, 1e3, 1.0, 1e-3]
+    assert [rate_in(text) for text in ("ms/s", "mhz", "rpm", "g", "")] == [None] * 5
+    assert (volts_in("mV"), volts_in("MV"), volts_in("Millivolts"), volts_in("V/g")) == (1e-3, 1e-3, 1e-3, None)
     assert [is_untold(text) for text in ("", " - ", "NONE", "m", "EU")] == [True, True, True, False, False]

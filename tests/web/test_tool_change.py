@@ -89,6 +89,7 @@ def test_tested_cuts_stand_beside_the_limit(opened, client: Client, shop: str, t
     told = page.locator(".tested-cuts .reads li")
     expect(told).to_have_text(
         [f"{name}: 2 of 3 classified correctly (67 %), 1 chattered where none was expected" for name in ("T1", "T1-long")]
+        + ["the column note is left aside"]
     )
     expect(page.locator(".tested-cuts .legend li")).to_have_text(["○stable", "✕chatter"])
     # the deepest cut is in the picture

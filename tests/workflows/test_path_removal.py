@@ -8,6 +8,7 @@ from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
+from rcsa_ident.toolpath.dexel import Surface
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from rcsa_ident.workflows.path_removal import default_cell, field_of, remove_along
 from tests.toolpath.test_surface_kernels import box
@@ -37,7 +38,7 @@ def test_a_slot_through_a_block_and_through_its_surface():
     assert len(found.path) == 53
     assert found.part.cell.max() == pytest.approx(0.25e-3)
     assert found.warnings == ()
-    other = removal(tooling(), slot(), surface=box(LOW, HIGH), step=1e-3)
+    other = removal(tooling(), slot(), surface=Surface(*box(LOW, HIGH)), step=1e-3)
     assert other.removed == pytest.approx(found.removed, rel=1e-9)
 
 

@@ -10,12 +10,12 @@ export const MARKS = {
   marginal: ["triangle-up-open", "△", "doubt"],
 };
 
-/** The cuts of CUTS.csv, as the service reads them. */
+/** The cuts of CUTS.csv, as the service reads them, and which columns it leaves aside. */
 export async function testedCuts(name, file) {
   const answer = await send("POST", "tested-cuts/preview", { body: file, headers: { "Content-Type": "text/csv" } }).catch((error) => {
     throw error instanceof Problem ? new Problem(error.status, { detail: `${name}: ${error.message}`, errors: error.errors }) : error;
   });
-  return (await answer.json()).cuts;
+  return answer.json();
 }
 
 /** Cuts as an address holds them: speed, depth and the verdict's first letter. */

@@ -29,6 +29,7 @@ export async function view(_args, query, place) {
   const from = quantity("Lowest speed", "speed", given.speeds_from, { name: "speeds_from" });
   const upTo = quantity("Highest speed", "speed", given.speeds_to, { name: "speeds_to" });
   const rate = quantity("Sampling rate", "hertz", null, { name: "rate_hz", hint: "Of a file that tells none" });
+  const sensitivity = quantity("Sensitivity", "none", null, { name: "sensitivity", hint: "Volts per SI unit, of a file in volts" });
   const channel = h("input", { autocomplete: "off", maxlength: 128 });
   const measures = select(
     [
@@ -59,6 +60,7 @@ export async function view(_args, query, place) {
         field("It measures", measures, { name: "quantity" }),
         field("Channel", channel, { name: "channel", hint: "Of several; all of one kind if left empty" }),
         rate,
+        sensitivity,
       ),
     ),
     h("p", null, again),
@@ -67,7 +69,7 @@ export async function view(_args, query, place) {
   let last = null;
 
   function asked() {
-    const numbers = { teeth, speed_rpm: speed, speeds_from: from, speeds_to: upTo, rate_hz: rate };
+    const numbers = { teeth, speed_rpm: speed, speeds_from: from, speeds_to: upTo, rate_hz: rate, sensitivity };
     const found = Object.entries(numbers).map(([name, box]) => [name, box.input.base]);
     found.push(["quantity", measures.value], ["channel", channel.value.trim()]);
     return new URLSearchParams(found.filter(([, value]) => value !== null && value !== ""));

@@ -127,7 +127,7 @@ function testedParts(lobes, tested, ontested) {
       input.value = "";
       if (!file) return;
       try {
-        ontested({ name: file.name, cuts: await testedCuts(file.name, file) });
+        ontested({ name: file.name, ...(await testedCuts(file.name, file)) });
       } catch (error) {
         failed(fault, error);
       }
@@ -140,6 +140,7 @@ function testedParts(lobes, tested, ontested) {
   const told = lobes.map((each) =>
     h("li", null, lobes.length > 1 ? h("strong", null, `${each.tooling}: `) : `${tested.name}: `, toldRight(each.tested)),
   );
+  told.push(...(tested.warnings ?? []).map((warning) => h("li", null, warning)));
   return { choose, beside: h("div", { class: "tested-cuts" }, testedLegend(tested.cuts), away, h("ul", { class: "reads" }, told)), fault };
 }
 

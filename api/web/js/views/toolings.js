@@ -123,7 +123,7 @@ async function imported(file, assumed) {
   const packed = /\.tools$/i.test(file.name);
   const query = new URLSearchParams(Object.entries(assumed()).filter(([, value]) => value !== null && value !== "")).toString();
   const answer = await send("POST", `toolings/import${query ? `?${query}` : ""}`, {
-    body: packed ? file : await file.text(),
+    body: file,
     headers: { "Content-Type": packed ? "application/zip" : "application/json" },
   });
   const { items } = await answer.json();
