@@ -103,7 +103,7 @@ HDF5 = [
 @pytest.mark.parametrize("spoil", HDF5, ids=lambda f: f.__name__)
 def test_hdf5_that_reaches_out_or_lies(campaign, tmp_path, spoil):
     spoil(tmp_path / "x.h5")
-    before = peak(campaign.reader) if campaign.reader.child.ready else None
+    before = peak(campaign.reader) if campaign.reader.child.held else None
     answer = campaign.put((tmp_path / "x.h5").read_bytes())
     assert answer.status_code == 422
     # refused by what stands in it, not by a limit
@@ -124,7 +124,7 @@ def test_hdf5_does_not_read_this_machine(campaign, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", hostile_matlab.HOSTILE)
 def test_matlab_bombs(campaign, name):
-    before = peak(campaign.reader) if campaign.reader.child.ready else None
+    before = peak(campaign.reader) if campaign.reader.child.held else None
     answer = campaign.put(hostile_matlab.HOSTILE[name][0](), ".mat")
     assert answer.status_code == 422
     assert "costs more" not in answer.text

@@ -1,0 +1,204 @@
+"""Processes for strangers' data, each in a session of its own, without the service's environment; their answers are JSON, never unpickled.
+
+The service pickles calls into their standard input and reads a line of JSON from their standard output for each that it awaits. They end
+with the service, however it ends: with it ends their input.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from api import log_lines
+from api.confinement import Confinement, confine
+from api.processes import limit, limit_memory
+
+#: All that a process is told of the service's environment: language, places of programs and kernels, threads of libraries. No password is.
+_VARIABLES = (
+    "PATH", "LD_LIBRARY_PATH", "HOME", "USERPROFILE", "LOCALAPPDATA", "SYSTEMROOT", "TMPDIR", "TEMP", "TMP", "XDG_CACHE_HOME",
+    "LANG", "LC_ALL", "LC_CTYPE", "TZ", "PYTHONHOME", "PYTHONDONTWRITEBYTECODE", "PYTHONUTF8",
+    "NUMBA_CACHE_DIR", "NUMBA_THREADING_LAYER", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES",
+)  # fmt: skip
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+#: Longest answer [bytes]; a longer one is the end of its process.
+_LONGEST = 1 << 28
+
+
+class Ended(Exception):
+    """The process has ended."""
+
+
+class Confined:
+    """A process that is started at once.
+
+    Parameters
+    ----------
+    serve : callable
+        What it does, with its `Line` and the arguments; importable by name.
+    *arguments
+        That can be pickled.
+    """
+
+    def __init__(self, serve: Callable[..., None], *arguments: Any) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", "from api.confined import main; main()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=_environment(),
+            start_new_session=True,
+        )
+        with contextlib.suppress(Ended):
+            # who asks it something finds out
+            self.send(serve, arguments)
+
+    @property
+    def pid(self) -> int:
+        """Its number."""
+        return self.process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether it runs."""
+        return self.process.poll() is None
+
+    def send(self, *what: Any) -> None:
+        """Hand something over; raises `Ended` where nobody takes it."""
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(pickle.dumps(what))
+            self.process.stdin.flush()
+        except (OSError, ValueError):
+            raise Ended from None
+
+    def receive(self, seconds: float) -> Any:
+        """Return what it says next.
+
+        Raises
+        ------
+        TimeoutError
+            It has said nothing in time, and is killed.
+        ValueError
+            What it has said is no JSON, or too long.
+        Ended
+        """
+        late = threading.Event()
+
+        def end() -> None:
+            late.set()
+            self.kill()
+
+        assert self.process.stdout is not None
+        timer = threading.Timer(seconds, end)
+        timer.start()
+        try:
+            line = self.process.stdout.readline(_LONGEST)
+        except (OSError, ValueError):
+            # closed meanwhile
+            line = b""
+        finally:
+            timer.cancel()
+        if late.is_set():
+            raise TimeoutError
+        if not line.endswith(b"\n") and len(line) < _LONGEST:
+            raise Ended
+        try:
+            return json.loads(line)
+        except RecursionError:
+            raise ValueError("lists in lists without end") from None
+
+    def was_killed(self) -> bool:
+        """Wait for its end, and return whether it was ended by force; not by itself, nor by a limit of processor time."""
+        # Windows says 1 of a process that another has ended
+        return self.process.wait() == -getattr(signal, "SIGKILL", -1)
+
+    def kill(self) -> None:
+        """End it at once, with all that it may have started."""
+        if not self.alive:
+            return
+        if hasattr(os, "killpg"):
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.pid, signal.SIGKILL)
+        else:
+            self.process.kill()
+
+    def end(self) -> None:
+        """End it, and wait for that."""
+        self.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(OSError):
+                pipe.close()
+
+
+class Line:
+    """The end of a process: calls come in, answers go out."""
+
+    def __init__(self, calls: BinaryIO, answers: BinaryIO) -> None:
+        self.calls, self.answers = calls, answers
+        self.come: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def cut_off(self, memory: int, readable: Iterable[Path], writable: Iterable[Path]) -> Confinement:
+        """Cut this process off, see `confine`, limit its memory [MiB] beyond what it has now, and take calls from then on."""
+        limit_memory(memory)
+        held = confine(readable, writable)
+        # a thread that ran before would not be cut off
+        threading.Thread(target=self._follow, daemon=True).start()
+        # no further process of this user, and no thread, is started from here
+        limit("RLIMIT_NPROC", 0)
+        return held
+
+    def _follow(self) -> None:
+        try:
+            while True:
+                self.come.put(pickle.load(self.calls))
+        except EOFError:
+            os._exit(0)
+        except BaseException:
+            logging.getLogger("rcsa_ident.service").exception("a call that cannot be taken")
+            os._exit(1)
+
+    @property
+    def idle(self) -> bool:
+        """Whether no call waits."""
+        return self.come.empty()
+
+    def take(self) -> Any:
+        """Return the next call; where the service closes the line, the process ends here."""
+        return self.come.get()
+
+    def tell(self, answer: str) -> None:
+        """Say JSON, which has no line end."""
+        self.answers.write(answer.encode() + b"\n")
+        self.answers.flush()
+
+
+def _environment() -> dict[str, str]:
+    known = {name: os.environ[name] for name in _VARIABLES if name in os.environ}
+    known |= {name: os.environ.get(name, "1") for name in _THREADS}
+    # its files are its own: nothing locks them, and nothing else may be locked
+    known["HDF5_USE_FILE_LOCKING"] = "FALSE"
+    return known | {"PYTHONPATH": os.pathsep.join(os.path.abspath(each) for each in sys.path)}
+
+
+def main() -> None:
+    """In the process: do what the service has started it for."""
+    # Ctrl-C may reach it where it has no session of its own
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    log_lines.start()
+    answers = os.fdopen(os.dup(1), "wb")
+    # what a library prints is no answer
+    os.dup2(2, 1)
+    serve, arguments = pickle.load(sys.stdin.buffer)
+    serve(Line(sys.stdin.buffer, answers), *arguments)
