@@ -149,7 +149,7 @@ class Line:
         self.calls, self.answers = calls, answers
         self.come: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
-    def cut_off(self, memory: int, readable: Iterable[Path], writable: Iterable[Path]) -> Confinement:
+    def cut_off(self, memory: int, readable: Iterable[Path] | None = None, writable: Iterable[Path] = ()) -> Confinement:
         """Cut this process off, see `confine`, limit its memory [MiB] beyond what it has now, and take calls from then on."""
         limit_memory(memory)
         held = confine(readable, writable)

@@ -57,13 +57,13 @@ class Confinement:
         return "held by limits of memory and time only: this system cannot cut it off from files and network"
 
 
-def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> Confinement:
+def confine(readable: Iterable[Path] | None, writable: Iterable[Path] = ()) -> Confinement:
     """Cut this process off; to be called by its only thread, for those that run already are not reached.
 
     Parameters
     ----------
-    readable : iterable of Path
-        Files, and folders with all below them, that may still be read. Python's own are, too.
+    readable : iterable of Path or None
+        Files, and folders with all below them, that may still be read. Python's own are, too. None closes no file.
     writable : iterable of Path
         Folders in which files may be read, made, written and removed.
     """
@@ -73,7 +73,8 @@ def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> Confinem
     if libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0) != 0:
         return Confinement()
     alone = len(os.listdir("/proc/self/task")) == 1
-    return Confinement(_close_files(libc, [*readable, *_python()], writable) and alone, filter_calls(libc))
+    files = readable is not None and _close_files(libc, [*readable, *_python()], writable) and alone
+    return Confinement(files, filter_calls(libc))
 
 
 def _python() -> list[Path]:
