@@ -60,7 +60,7 @@ class Limits:
     def costly(self) -> InputError:
         """The refusal of an upload that costs more."""
         found = f"a file that costs more than {self.memory} MiB or {self.seconds:g} s to read"
-        return InputError("recording", found, "a recording that is cheaper to read: fewer samples, or a simpler format")
+        return InputError("file", found, "a file that is cheaper to read: fewer samples or entries, or a simpler format")
 
 
 class Reader:
@@ -134,7 +134,7 @@ class Reader:
                 raise answer
             if kind == "failed":
                 log.error("a call of the reader has failed", extra={"fields": {"error": answer}})
-                raise InputError("recording", "a file that cannot be read", "a complete file of its format")
+                raise InputError("file", "one that cannot be read", "a complete file of its format")
         raise Busy
 
     def _new(self) -> _Reading:

@@ -24,6 +24,7 @@ from tests.api.in_process import Here, embedded
 from tests.api.recordings import RATE, channels, content, declared
 from tests.fixtures import hostile_hdf5, hostile_matlab, hostile_tdms
 from tests.fixtures.recording_formats import FORMATS
+from tests.fixtures.tool_library import END_MILL, library
 
 BINARY = {"Content-Type": "application/octet-stream"}
 NAMES = ["flange_x", "flange_y", "fixture_x", "fixture_y"]
@@ -162,6 +163,17 @@ def test_what_is_no_recording(campaign, suffix, raw):
     answer = campaign.put(raw, suffix)
     # a number without end is a sample that was lost
     assert answer.status_code == 422 or not answer.json()["verdict"]["usable"]
+
+
+def test_a_tool_library_is_read_where_recordings_are(campaign):
+    """Its ZIP and its XML are opened by the cut-off process, too."""
+    packed, headers = io.BytesIO(), {"Content-Type": "application/zip"}
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("tools.json", json.dumps(library(END_MILL)))
+    before = campaign.reader.child.calls
+    assert campaign.http.post("/v1/toolings/import", content=packed.getvalue(), headers=headers).json()["items"][0]["status"] == "written"
+    assert campaign.http.post("/v1/toolings/import", content=packed.getvalue()[:50], headers=headers).status_code == 422
+    assert campaign.reader.child.calls == before + 2
 
 
 def test_a_zip_of_a_bomb(campaign):
