@@ -26,7 +26,7 @@ from api.processes import limit, limit_memory
 
 #: All that a process is told of the service's environment: language, places of programs and kernels, threads of libraries. No password is.
 _VARIABLES = (
-    "PATH", "LD_LIBRARY_PATH", "HOME", "USERPROFILE", "LOCALAPPDATA", "SYSTEMROOT", "TMPDIR", "TEMP", "TMP", "XDG_CACHE_HOME",
+    "PATH", "LD_LIBRARY_PATH", "LD_PRELOAD", "HOME", "USERPROFILE", "LOCALAPPDATA", "SYSTEMROOT", "TMPDIR", "TEMP", "TMP", "XDG_CACHE_HOME",
     "LANG", "LC_ALL", "LC_CTYPE", "TZ", "PYTHONHOME", "PYTHONDONTWRITEBYTECODE", "PYTHONUTF8",
     "NUMBA_CACHE_DIR", "NUMBA_THREADING_LAYER", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES",
 )  # fmt: skip
@@ -52,7 +52,7 @@ class Confined:
 
     def __init__(self, serve: Callable[..., None], *arguments: Any) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-c", "from api.confined import main; main()"],
+            [sys.executable, "-P", "-c", "from api.confined import main; main()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=_environment(),
