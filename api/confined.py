@@ -7,22 +7,21 @@ with the service, however it ends: with it ends their input.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import logging
 import os
 import pickle
 import queue
+import select
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, BinaryIO
 
 from api import log_lines
-from api.confinement import Confinement, confine
-from api.processes import limit, limit_memory
 
 #: All that a process is told of the service's environment: language, places of programs and kernels, threads of libraries. No password is.
 _VARIABLES = (
@@ -31,6 +30,8 @@ _VARIABLES = (
     "NUMBA_CACHE_DIR", "NUMBA_THREADING_LAYER", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES",
 )  # fmt: skip
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+#: Of `prctl`.
+_SIGNAL_AT_PARENTS_END = 1
 #: Longest answer [bytes]; a longer one is the end of its process.
 _LONGEST = 1 << 28
 
@@ -149,15 +150,68 @@ class Line:
         self.calls, self.answers = calls, answers
         self.come: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
-    def cut_off(self, memory: int, readable: Iterable[Path] | None = None, writable: Iterable[Path] = ()) -> Confinement:
-        """Cut this process off, see `confine`, limit its memory [MiB] beyond what it has now, and take calls from then on."""
-        limit_memory(memory)
-        held = confine(readable, writable)
-        # a thread that ran before would not be cut off
+    def follow(self) -> None:
+        """Take calls from now on, and end with the service."""
         threading.Thread(target=self._follow, daemon=True).start()
-        # no further process of this user, and no thread, is started from here
-        limit("RLIMIT_NPROC", 0)
-        return held
+
+    def apart(self, say: Callable[[], str]) -> int:
+        """Have a copy of this process say something and end: nothing of what it does stays here.
+
+        Parameters
+        ----------
+        say : callable
+            Called in the copy; returns JSON.
+
+        Returns
+        -------
+        int
+            0, or the signal that has ended the copy before it had said anything; SIGABRT where what it has said is not one line.
+        """
+        ours, theirs = os.pipe()
+        copy = os.fork()
+        if copy == 0:
+            try:
+                # the kernel ends it with this process, which ends with the service
+                ctypes.CDLL(None).prctl(_SIGNAL_AT_PARENTS_END, signal.SIGKILL)
+                for each in (self.calls.fileno(), self.answers.fileno(), ours):
+                    os.close(each)
+                with open(theirs, "wb") as line:
+                    line.write(say().encode() + b"\n")
+            finally:
+                os._exit(0)
+        os.close(theirs)
+        said = self._heard(ours)
+        # it may have closed its line and go on
+        os.kill(copy, signal.SIGKILL)
+        _, status = os.waitpid(copy, 0)
+        if said.endswith(b"\n") and said.count(b"\n") == 1:
+            self.answers.write(said)
+            self.answers.flush()
+            return 0
+        return os.WTERMSIG(status) if os.WIFSIGNALED(status) and not said else signal.SIGABRT
+
+    def _heard(self, line: int) -> bytes:
+        """All that a copy says, while the service is there."""
+        waits, said = select.poll(), bytearray()
+        waits.register(line, select.POLLIN)
+        waits.register(self.calls, 0)
+        with open(line, "rb", buffering=0) as copy:
+            while len(said) < _LONGEST:
+                ready = dict(waits.poll())
+                if self.calls.fileno() in ready:
+                    os._exit(1)
+                part = copy.read(1 << 20)
+                if not part:
+                    break
+                said += part
+        return bytes(said)
+
+    def asked(self) -> Any:
+        """Return the next call while no thread takes them; where the service has gone, the process ends here."""
+        try:
+            return pickle.load(self.calls)
+        except EOFError:
+            os._exit(0)
 
     def _follow(self) -> None:
         try:

@@ -60,8 +60,8 @@ def _with_arguments() -> dict[str, tuple[_Numbers, tuple[_Tests, ...]]]:
         "clone": ((56, 220), (((0, _THREAD | _NAMESPACES, _THREAD),),)),
         "kill": ((62, 129), ((own,),)),
         "tgkill": ((234, 131), ((own,),)),
-        # its own limits can be read, those of processor time and of threads be set
-        "prlimit64": ((302, 261), tuple(((0, _WORD, 0), each) for each in ((2, _ALL, 0), (1, _WORD, 0), (1, _WORD, 6)))),
+        # its own limits can be read
+        "prlimit64": ((302, 261), (((0, _WORD, 0), (2, _ALL, 0)),)),
         # no locks, no leases, no owner who gets signals
         "fcntl": ((72, 25), tuple(((1, _WORD, each),) for each in (duplicate, *flags, duplicate_on_exec))),
         # whether it is a terminal, and close on exec

@@ -1,6 +1,7 @@
 """The reader process: reads uploads within limits of memory and time, and is replaced where an upload exceeds them.
 
-It is cut off from other files, network and processes, see `api.confinement`: it sees the files of its call alone, in its room.
+On Linux a copy of it answers each call and ends: cut off from other files, network and processes, see `api.confinement`, it sees the files
+of its call alone, in its room, and leaves nothing to the next one.
 """
 
 from __future__ import annotations
@@ -10,18 +11,21 @@ import contextlib
 import json
 import logging
 import shutil
+import signal
+import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from api.confined import Confined, Ended, Line
-from api.confinement import Confinement
+from api.confinement import Confinement, confine
 from api.files import Full, is_short, no_room
 from api.log_lines import ids, telling
-from api.processes import limit
+from api.processes import limit, limit_memory
 from api.reading import reader_tasks
 from api.reading.room import Room
 from api.shares import FairThreads
@@ -231,26 +235,63 @@ class _Reading:
 
 def _serve(line: Line, limits: Limits, prepare: Callable[[], None], room: Room) -> None:
     """In the process: answer calls until the service ends it."""
-    from rcsa_ident.io.channels import LARGEST_STORED
-
     prepare()
-    # no file larger than the largest result
-    limit("RLIMIT_FSIZE", LARGEST_STORED + LARGEST_STORED // 8)
-    tempfile.tempdir = str(room.made)
-    held = line.cut_off(limits.memory, [room.given], [room.made])
-    line.tell(json.dumps([held.files, held.calls]))
+    if sys.platform == "linux":
+        _serve_apart(line, limits, room)
+    _limit(limits, room)
+    line.follow()
+    line.tell(json.dumps([False, False]))
     while True:
         call, arguments, known = line.take()
         # CPU time counts from the start of the process
         limit("RLIMIT_CPU", int(time.process_time() + limits.seconds) + 1, -1)
-        with telling(**known):
-            line.tell(_answer(call, arguments))
+        line.tell(_answer(call, arguments, known))
 
 
-def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
+def _serve_apart(line: Line, limits: Limits, room: Room) -> NoReturn:
+    """Answer each call in a copy of this process, which is cut off and ends with it: no call sees what another has left."""
+    if line.apart(partial(_what_holds, limits, room)):
+        line.tell(json.dumps([False, False]))
+    while True:
+        ended_by = line.apart(partial(_answer_cut_off, limits, room, *line.asked()))
+        if ended_by:
+            line.tell(json.dumps(["killed" if ended_by == signal.SIGKILL else "costly", ""]))
+
+
+def _limit(limits: Limits, room: Room) -> None:
+    from rcsa_ident.io.channels import LARGEST_STORED
+
+    limit_memory(limits.memory)
+    # no file larger than the largest result
+    limit("RLIMIT_FSIZE", LARGEST_STORED + LARGEST_STORED // 8)
+    tempfile.tempdir = str(room.made)
+
+
+def _cut_off(limits: Limits, room: Room) -> Confinement:
+    _limit(limits, room)
+    # a second later it is ended even where it takes no heed
+    limit("RLIMIT_CPU", int(limits.seconds) + 1, int(limits.seconds) + 2)
+    # no further process of this user, and no thread, is started from here
+    limit("RLIMIT_NPROC", 0)
+    return confine([room.given], [room.made])
+
+
+def _what_holds(limits: Limits, room: Room) -> str:
+    held = _cut_off(limits, room)
+    return json.dumps([held.files, held.calls])
+
+
+def _answer_cut_off(limits: Limits, room: Room, *asked: Any) -> str:
+    _cut_off(limits, room)
+    return _answer(*asked)
+
+
+def _answer(call: Callable[..., Any], arguments: tuple[Any, ...], known: Mapping[str, str]) -> str:
+    """What the service is told of a call; `known` are the ids of its lines in the log."""
     kind, answer = "answer", ""
     try:
-        return json.dumps([kind, call(*arguments)], allow_nan=False)
+        with telling(**known):
+            return json.dumps([kind, call(*arguments)], allow_nan=False)
     except InputError as error:
         found = error.found if isinstance(error.found, str) else repr(error.found)
         return json.dumps(["refused", [error.field, found[:1000], error.allowed[:1000], error.where]])

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from api.confined import Confined, Ended, Line
+from api.confinement import confine
 from api.log_lines import ids, telling
+from api.processes import limit, limit_memory
 from api.work.requests import TooLong
 from rcsa_ident.errors import InputError
 
@@ -146,8 +148,12 @@ def _failure(words: str, told: str) -> Failed:
 def _serve(line: Line, memory: int, prepare: Callable[[], None], spare: Callable[[], None]) -> None:
     """In the process: answer calls until the service ends it."""
     prepare()
+    limit_memory(memory)
+    line.follow()
+    # no further process of this user, and no thread, is started from here
+    limit("RLIMIT_NPROC", 0)
     # its files stay open: what it compiles it keeps for all
-    line.cut_off(memory)
+    confine(None)
     line.tell("true")
     if line.idle:
         spare()
