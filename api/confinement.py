@@ -1,16 +1,14 @@
 """A process that reads strangers' files cuts itself off first: from files, network, other processes and programs, where the kernel can.
 
-Linux's Landlock closes the file system, TCP and signals, a seccomp filter the rest. Neither needs rights, neither can be taken back. The
-numbers and structures are those of the kernel's headers linux/landlock.h, linux/seccomp.h and linux/filter.h.
+Linux's Landlock closes the file system, TCP and signals, a seccomp filter all calls that are not needed (`api.system_calls`). Neither needs
+rights, neither can be taken back. The numbers and structures are those of the kernel's header linux/landlock.h.
 """
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
-import errno
 import os
-import platform
 import struct
 import sys
 import sysconfig
@@ -19,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rcsa_ident
+from api.system_calls import filter_calls
 
 _NO_NEW_PRIVILEGES = 38
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
@@ -29,16 +28,6 @@ _READ_FILE, _READ_FOLDER, _WRITE_FILE, _REMOVE_FILE, _MAKE_FILE, _TRUNCATE = 1 <
 _FOR_A_FILE = _READ_FILE | _WRITE_FILE | _TRUNCATE
 _TCP, _OUTSIDE = (1 << 2) - 1, (1 << 2) - 1
 
-_ALLOW, _DENY = 0x7FFF0000, 0x00050000 | errno.EACCES
-#: Architecture as the filter sees it, the call that installs one, and what is denied: socket, connect, ptrace, process_vm_readv and
-#: _writev, execve and execveat, and (the same everywhere) io_uring_setup and pidfd_getfd.
-_CALLS = {
-    "x86_64": (0xC000003E, 317, (41, 42, 101, 310, 311, 59, 322)),
-    "aarch64": (0xC00000B7, 277, (198, 203, 117, 270, 271, 221, 281)),
-}
-_EVERYWHERE = (425, 438)
-_FIRST_OF_X32 = 0x40000000
-
 
 @dataclass(frozen=True, slots=True)
 class Confinement:
@@ -48,28 +37,33 @@ class Confinement:
     ----------
     files : bool
         It opens nothing but what it was told. From version 6 of Landlock it sends no signals either.
-    network : bool
-        It makes no socket that leads out of it, starts no program and looks into no other process.
+    calls : bool
+        It makes no system call but those of `api.system_calls`: no socket, process, program, signal to others, change of a file's mode.
     """
 
     files: bool = False
-    network: bool = False
+    calls: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of it holds."""
+        return self.files and self.calls
 
     def __str__(self) -> str:
-        if self.files and self.network:
+        if self.whole:
             return "cut off from other files, the network and other processes"
-        if self.files or self.network:
+        if self.files or self.calls:
             return f"cut off from {'other files' if self.files else 'the network and other processes'} only: this system cannot do more"
         return "held by limits of memory and time only: this system cannot cut it off from files and network"
 
 
-def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> Confinement:
+def confine(readable: Iterable[Path] | None, writable: Iterable[Path] = ()) -> Confinement:
     """Cut this process off; to be called by its only thread, for those that run already are not reached.
 
     Parameters
     ----------
-    readable : iterable of Path
-        Files, and folders with all below them, that may still be read. Python's own are, too.
+    readable : iterable of Path or None
+        Files, and folders with all below them, that may still be read. Python's own are, too. None closes no file.
     writable : iterable of Path
         Folders in which files may be read, made, written and removed.
     """
@@ -79,7 +73,8 @@ def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> Confinem
     if libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0) != 0:
         return Confinement()
     alone = len(os.listdir("/proc/self/task")) == 1
-    return Confinement(_close_files(libc, [*readable, *_python()], writable) and alone, _close_calls(libc))
+    files = readable is not None and _close_files(libc, [*readable, *_python()], writable) and alone
+    return Confinement(files, filter_calls(libc))
 
 
 def _python() -> list[Path]:
@@ -124,20 +119,3 @@ def _allow(libc: ctypes.CDLL, rules: int, paths: Iterable[Path], rights: int) ->
                     raise OSError(ctypes.get_errno(), "Landlock refuses a rule", str(path))
             finally:
                 os.close(place)
-
-
-def _close_calls(libc: ctypes.CDLL) -> bool:
-    """Deny calls by number in all threads of this process."""
-    if platform.machine() not in _CALLS:
-        return False
-    machine, install, numbers = _CALLS[platform.machine()]
-    denied = (*numbers, *_EVERYWHERE)
-    load, equal, at_least, end = 0x20, 0x15, 0x35, 0x06
-    # a list of (code, jump if true, jump if false, number): another architecture's calls are denied, and those of the 32-bit ABI
-    rows = [(load, 0, 0, 4), (equal, 1, 0, machine), (end, 0, 0, _DENY), (load, 0, 0, 0), (at_least, len(denied) + 1, 0, _FIRST_OF_X32)]
-    rows += [(equal, len(denied) - i, 0, number) for i, number in enumerate(denied)]
-    rows += [(end, 0, 0, _ALLOW), (end, 0, 0, _DENY)]
-    code = ctypes.create_string_buffer(b"".join(struct.pack("=HBBI", *row) for row in rows))
-    program = struct.pack("@HP", len(rows), ctypes.addressof(code))
-    everyone = 1
-    return libc.syscall(install, 1, everyone, program) == 0

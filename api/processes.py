@@ -100,20 +100,16 @@ class Child(SpawnProcess):
     *arguments
         That cross processes.
     name : str
-    follows : bool
-        Whether it ends with its parent from the start; else `call` sees to it, before it waits for anything.
     """
 
-    def __init__(self, call: Callable[..., None], *arguments: Any, name: str, follows: bool = True) -> None:
+    def __init__(self, call: Callable[..., None], *arguments: Any, name: str) -> None:
         spawn_context()
-        self.follows = follows
         super().__init__(target=call, args=arguments, name=name, daemon=True)
         self.born = time.monotonic()
         self.start()
 
     def run(self) -> None:
-        if self.follows:
-            follow_parent()
+        follow_parent()
         # Ctrl-C reaches the whole group of processes: the service takes it and ends its children
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         log_lines.start()

@@ -174,6 +174,7 @@ def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event)
     from api.jobs.cluster import over_cluster
     from api.jobs.durable import Durable
     from api.jobs.worker import Carrier, JobWorker
+    from api.processes import limit_memory
     from api.reading.campaigns import load_campaign
     from api.stores.sql import open_store
 
@@ -185,6 +186,7 @@ def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event)
         "lobes": lobes.carry,
         "path": partial(paths.carry, most=settings.job_work_seconds),
     }
+    limit_memory(settings.job_memory)
     JobWorker(store.jobs, Durable(settings.engine_url), {kind: carriers[kind]}, settings.job_attempts).run(ready, stop)
 
 

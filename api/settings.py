@@ -125,6 +125,7 @@ class Settings(BaseSettings):
     )
     lobe_workers: int = Field(1, ge=0, le=256, description="the same for lobes as jobs; kinds never wait for each other")
     path_workers: int = Field(1, ge=0, le=256, description="the same for tools along paths")
+    job_memory: _MiB = Field(4096, ge=1024, le=10**6, description="for each process of jobs; a job that needs more has failed")
     job_nice: int = Field(10, ge=0, le=19, description="how far processes for jobs stand behind queries and streams, as `nice`")
     job_queue: int = Field(50, ge=1, le=10**6, description="jobs of a group that may wait or run")
     job_attempts: int = Field(

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from contextvars import copy_context
 from typing import Any
 
+from api.codec import Unknown, decode, encode
 from api.jobs.backend import VERSION, Remember
-from api.jobs.codec import Unknown, decode, encode
 from api.stores.entities import Unavailable
 from api.stores.jobs import Event, Jobs
 from rcsa_ident.errors import InputError
@@ -29,6 +29,8 @@ MANY = 1000
 GRACE = 2.0
 #: Time without an answer of the store after which the process gives up [s].
 PATIENCE = 60.0
+#: The refusal of a job that needs more memory than its process may take.
+TOO_LARGE = InputError("job", "one that needs more memory than the service allows", "a smaller one, or a larger RCSA_IDENT_JOB_MEMORY")
 
 
 class Stopped(Exception):
@@ -143,8 +145,9 @@ class JobContext:
         # the engine stores results only: it would restore exceptions by rules of its own
         try:
             return {"value": compute()}
-        except InputError as error:
-            return {"refused": (error.field, str(error.found), error.allowed, error.where)}
+        except (InputError, MemoryError) as error:
+            refused = TOO_LARGE if isinstance(error, MemoryError) else error
+            return {"refused": (refused.field, str(refused.found), refused.allowed, refused.where)}
         except Stopped:
             return {}
         except Exception as error:

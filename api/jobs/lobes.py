@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from api.jobs.codec import Unknown, decode, encode
+from api.codec import Unknown, decode, encode
 from api.jobs.job_context import JobContext
 from api.stores.jobs import PARTIAL, Job, Outcome
 from api.work import tasks

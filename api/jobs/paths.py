@@ -6,7 +6,7 @@ import json
 import time
 from functools import partial
 
-from api.jobs.codec import Unknown, decode, encode
+from api.codec import Unknown, decode, encode
 from api.jobs.job_context import JobContext
 from api.stores.jobs import Job, Outcome
 from api.work import paths

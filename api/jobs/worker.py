@@ -18,7 +18,7 @@ from typing import Any
 import psutil
 
 from api.jobs.backend import JobBackend, Remember
-from api.jobs.job_context import Faulty, JobContext, Outdated, Stopped
+from api.jobs.job_context import TOO_LARGE, Faulty, JobContext, Outdated, Stopped
 from api.log_lines import tell, telling
 from api.stores.entities import Damaged, Unavailable
 from api.stores.jobs import Job, Jobs, Outcome, Worker
@@ -73,7 +73,8 @@ def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remem
     except (Stopped, Outdated):
         # of an outdated job the engine knows no more than that it is over: it forgets it, and begins anew
         return None
-    except InputError as error:
+    except (InputError, MemoryError) as fault:
+        error = TOO_LARGE if isinstance(fault, MemoryError) else fault
         found = error.found if isinstance(error.found, str) else repr(error.found)
         where = f"{error.where}: " if error.where else ""
         return failed(f"{where}{error.field}: found {found}, allowed is {error.allowed}", (error.field, found, error.allowed))

@@ -75,7 +75,7 @@ class Opening:
             id, group, self.name, self.machine_id, self.tooling.name, now(), rate, q.axes, len(q.sensors), math.ceil(seconds * rate)
         )
 
-    async def design(self, work: Work, first: int, samples: FloatArray | None) -> tuple[bytes, dict[str, Any]]:
+    async def design(self, work: Work, first: int, samples: FloatArray | None) -> tuple[str, dict[str, Any]]:
         """Return the plan of the observer and the content of the client's event `ready`, computed by a worker."""
         if self.source is not None:
             return await work.run(design_replay, self.machine, self.tooling, self.question, pair_reader(self.source.cut, self.source.air))

@@ -1,6 +1,7 @@
 """The reader process: reads uploads within limits of memory and time, and is replaced where an upload exceeds them.
 
-It is cut off from other files, network and processes, see `api.confinement`: it sees the files of its call alone, in its room.
+On Linux a copy of it answers each call and ends: cut off from other files, network and processes, see `api.confinement`, it sees the files
+of its call alone, in its room, and leaves nothing to the next one.
 """
 
 from __future__ import annotations
@@ -10,18 +11,21 @@ import contextlib
 import json
 import logging
 import shutil
+import signal
+import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+from api.confined import Confined, Ended, Line
 from api.confinement import Confinement, confine
 from api.files import Full, is_short, no_room
 from api.log_lines import ids, telling
-from api.processes import Child, follow_parent, limit, limit_memory, spawn_context
+from api.processes import limit, limit_memory
 from api.reading import reader_tasks
 from api.reading.room import Room
 from api.shares import FairThreads
@@ -60,7 +64,7 @@ class Limits:
     def costly(self) -> InputError:
         """The refusal of an upload that costs more."""
         found = f"a file that costs more than {self.memory} MiB or {self.seconds:g} s to read"
-        return InputError("recording", found, "a recording that is cheaper to read: fewer samples, or a simpler format")
+        return InputError("file", found, "a file that is cheaper to read: fewer samples or entries, or a simpler format")
 
 
 class Reader:
@@ -131,10 +135,10 @@ class Reader:
             if kind == "full":
                 raise Full
             if kind == "refused":
-                raise InputError(*answer)
+                raise answer
             if kind == "failed":
                 log.error("a call of the reader has failed", extra={"fields": {"error": answer}})
-                raise InputError("recording", "a file that cannot be read", "a complete file of its format")
+                raise InputError("file", "one that cannot be read", "a complete file of its format")
         raise Busy
 
     def _new(self) -> _Reading:
@@ -162,17 +166,19 @@ class Reader:
 
 
 class _Reading:
-    """One reader process, the pipe to it and its room."""
+    """One reader process and its room."""
 
     def __init__(self, limits: Limits, prepare: Callable[[], None], room: Room, least: int) -> None:
-        self.limits, self.room, self.least, self.calls, self.ready, self.ended = limits, room, least, 0, False, False
-        self.pipe, theirs = spawn_context().Pipe()
-        self.process = Child(_serve, theirs, limits, prepare, room, name="reader", follows=False)
-        theirs.close()
+        self.limits, self.room, self.least, self.calls, self.ended = limits, room, least, 0, False
+        self.held: Confinement | None = None
+        self.process = Confined(_serve, limits, prepare, room)
 
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
         """Return the outcome of a call (answer, refused, failed, costly, full disk, or killed from outside) and its content."""
         try:
+            if not self.greet():
+                # a slow start says nothing about the upload
+                return "killed", None
             kind, answer = self._outcome(call, self.room.take_in(arguments))
             if kind == "answer":
                 self.room.give_out()
@@ -189,86 +195,110 @@ class _Reading:
 
     def _outcome(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
         """Ask the process; `ended` is set where it answers no further call."""
+        self.calls += 1
         try:
-            self._until_ready()
-            self.calls += 1
-            self.pipe.send((call, arguments, ids()))
-            kind, answer = self._receive(self.limits.wall_seconds)
-            return kind, answer
-        except TimeoutError:
-            self.ended = True
-            self.process.kill()
-            # a slow start says nothing about the upload
-            return "costly" if self.ready else "killed", None
-        except BrokenPipeError:
-            # it ended before this call
+            self.process.send(call, arguments, ids())
+        except Ended:
+            # before this call
             self.ended = True
             return "killed", None
-        except (EOFError, OSError):
+        try:
+            kind, answer = self.process.receive(self.limits.wall_seconds)
+            return kind, InputError(*answer) if kind == "refused" else answer
+        except (TimeoutError, TypeError, ValueError):
+            # too late, or no answer
             self.ended = True
-            self.process.join(10.0)
-            return "killed" if self.process.killed or not self.ready else "costly", None
+            return "costly", None
+        except Ended:
+            self.ended = True
+            return "killed" if self.process.was_killed() else "costly", None
 
-    def greet(self) -> None:
-        """Wait until the process is ready, and say what holds in it."""
-        # whoever asks finds out what has happened
-        with contextlib.suppress(EOFError, OSError):
-            self._until_ready()
-
-    def _until_ready(self) -> None:
-        if not self.ready:
-            held = Confinement(*self._receive(_START))
-            log.info("reader process: %s", held, extra={"fields": {"files": held.files, "network": held.network}})
-            self.ready = True
-
-    def _receive(self, seconds: float) -> Any:
-        if not self.pipe.poll(seconds):
-            raise TimeoutError
-        # parsed as JSON, never unpickled: an upload may have taken the process over
-        return json.loads(self.pipe.recv_bytes())
+    def greet(self) -> bool:
+        """Wait until the process is ready, say what holds in it, and return whether it takes calls."""
+        if self.held is None:
+            try:
+                self.held = held = Confinement(*self.process.receive(_START))
+            except (Ended, TimeoutError, TypeError, ValueError):
+                self.ended = True
+                return False
+            # links are the service's own files under other names: without the filter their modes could be changed
+            self.room.links = held.calls
+            level = logging.INFO if held.whole else logging.WARNING
+            log.log(level, "reader process: %s", held, extra={"fields": {"files": held.files, "calls": held.calls}})
+        return True
 
     def end(self) -> None:
-        """End the process: by closing its pipe, else by SIGKILL."""
-        self.pipe.close()
-        self.process.end(0.5)
+        """End the process at once, and remove its room."""
+        self.process.end()
         self.room.remove()
 
 
-def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None], room: Room) -> None:
-    """In the process: answer calls until the pipe is closed."""
+def _serve(line: Line, limits: Limits, prepare: Callable[[], None], room: Room) -> None:
+    """In the process: answer calls until the service ends it."""
+    prepare()
+    if sys.platform == "linux":
+        _serve_apart(line, limits, room)
+    _limit(limits, room)
+    line.follow()
+    line.tell(json.dumps([False, False]))
+    while True:
+        call, arguments, known = line.take()
+        # CPU time counts from the start of the process
+        limit("RLIMIT_CPU", int(time.process_time() + limits.seconds) + 1, -1)
+        line.tell(_answer(call, arguments, known))
+
+
+def _serve_apart(line: Line, limits: Limits, room: Room) -> NoReturn:
+    """Answer each call in a copy of this process, which is cut off and ends with it: no call sees what another has left."""
+    if line.apart(partial(_what_holds, limits, room)):
+        line.tell(json.dumps([False, False]))
+    while True:
+        ended_by = line.apart(partial(_answer_cut_off, limits, room, *line.asked()))
+        if ended_by:
+            line.tell(json.dumps(["killed" if ended_by == signal.SIGKILL else "costly", ""]))
+
+
+def _limit(limits: Limits, room: Room) -> None:
     from rcsa_ident.io.channels import LARGEST_STORED
 
-    prepare()
     limit_memory(limits.memory)
     # no file larger than the largest result
     limit("RLIMIT_FSIZE", LARGEST_STORED + LARGEST_STORED // 8)
     tempfile.tempdir = str(room.made)
-    held = confine([room.given], [room.made])
-    # a thread that ran before would not be cut off
-    follow_parent()
-    pipe.send_bytes(json.dumps([held.files, held.network]).encode())
-    while True:
-        try:
-            call, arguments, known = pipe.recv()
-        except EOFError:
-            return
-        # CPU time counts from the start of the process
-        limit("RLIMIT_CPU", int(time.process_time() + limits.seconds) + 1, -1)
-        with telling(**known):
-            pipe.send_bytes(_answer(call, arguments))
 
 
-def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+def _cut_off(limits: Limits, room: Room) -> Confinement:
+    _limit(limits, room)
+    # a second later it is ended even where it takes no heed
+    limit("RLIMIT_CPU", int(limits.seconds) + 1, int(limits.seconds) + 2)
+    # no further process of this user, and no thread, is started from here
+    limit("RLIMIT_NPROC", 0)
+    return confine([room.given], [room.made])
+
+
+def _what_holds(limits: Limits, room: Room) -> str:
+    held = _cut_off(limits, room)
+    return json.dumps([held.files, held.calls])
+
+
+def _answer_cut_off(limits: Limits, room: Room, *asked: Any) -> str:
+    _cut_off(limits, room)
+    return _answer(*asked)
+
+
+def _answer(call: Callable[..., Any], arguments: tuple[Any, ...], known: Mapping[str, str]) -> str:
+    """What the service is told of a call; `known` are the ids of its lines in the log."""
     kind, answer = "answer", ""
     try:
-        return json.dumps([kind, call(*arguments)], allow_nan=False).encode()
+        with telling(**known):
+            return json.dumps([kind, call(*arguments)], allow_nan=False)
     except InputError as error:
         found = error.found if isinstance(error.found, str) else repr(error.found)
-        return json.dumps(["refused", [error.field, found[:1000], error.allowed[:1000], error.where]]).encode()
+        return json.dumps(["refused", [error.field, found[:1000], error.allowed[:1000], error.where]])
     except MemoryError:
         kind = "costly"
     except Exception as error:
         if no_room(error):
-            return json.dumps(["full", ""]).encode()
+            return json.dumps(["full", ""])
         kind, answer = "failed", f"{type(error).__name__}: {error}"[:1000]
-    return json.dumps([kind, answer]).encode()
+    return json.dumps([kind, answer])

@@ -11,8 +11,9 @@ from rcsa_ident.signals.recording import Sensor
 
 
 def warm() -> None:
-    """Import and compile what a verdict needs, see `examine.warm`, and what listening does."""
+    """Import and compile what a verdict needs, see `examine.warm`, and what listening does; import what reads tool libraries."""
     from api.reading import examine, hammer_files, hearing  # noqa: F401, what is imported once is there
+    from api.work import libraries  # noqa: F401
 
     examine.warm()
     hearing.warm()

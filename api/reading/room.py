@@ -1,4 +1,4 @@
-"""The folder that is all a reader process sees: the files of its call are linked into it, and what it writes is taken out of it."""
+"""The folder that is all a reader process sees: the files of its call are put into it, and what it writes is taken out of it."""
 
 from __future__ import annotations
 
@@ -20,6 +20,11 @@ class Room:
     ----------
     folder : Path, optional
         Where it is made; beside the files that are linked into it, else these are copied.
+
+    Attributes
+    ----------
+    links : bool
+        Whether files may be linked: their process can change no file's mode, times or attributes.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -30,7 +35,7 @@ class Room:
         self.given.mkdir()
         self.made.mkdir()
         self.wanted: dict[Path, Path] = {}
-        self.linked = 0
+        self.linked, self.links = 0, False
 
     def take_in(self, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return the arguments of a call with every file, and every place for one, as the process sees it."""
@@ -67,9 +72,10 @@ class Room:
         self.linked += 1
         # what was deleted meanwhile is missed by whoever reads it
         with suppress(FileNotFoundError):
-            try:
-                os.link(path, link)
-            except (AttributeError, OSError):
+            if self.links:
                 # a system, a file system or another disk without hard links
-                shutil.copyfile(path, link)
+                with suppress(AttributeError, OSError):
+                    os.link(path, link)
+                    return link
+            shutil.copyfile(path, link)
         return link

@@ -75,7 +75,7 @@ async def import_library(
     if contact is not None:
         joint = found_or_404(await run_in_threadpool(components.store.toolings.get, caller.group, contact), f"tooling {contact}").text
     given = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, holder=holder)
-    entries = await while_there(request, components.work.run(imported, raw, given, joint))
+    entries = await while_there(request, components.reader.run(imported, raw, given, joint))
 
     def keep() -> list[ImportedTool]:
         return [_kept(components, caller, *entry, replace) for entry in entries]

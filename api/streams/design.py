@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from api.codec import encode
 from api.streams.engine import Column, Plan
 from api.work.forces import ReadPair, observed
 from api.work.machine_cache import read
@@ -47,8 +47,8 @@ class StreamQuestion:
 
 def design(
     machine: MachineText, tooling: ToolingSource, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
-) -> tuple[bytes, dict[str, Any]]:
-    """Return the pickled plan of a stream for the stream process, and the content of the client's event `ready`.
+) -> tuple[str, dict[str, Any]]:
+    """Return the encoded plan of a stream for the stream process, and the content of the client's event `ready`.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def design(
     return _planned(machine, tooling, question, first, recording, still, follow=True)
 
 
-def design_replay(machine: MachineText, tooling: ToolingSource, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
+def design_replay(machine: MachineText, tooling: ToolingSource, question: StreamQuestion, source: ReadPair) -> tuple[str, dict[str, Any]]:
     """Return the same for a recording, whose streamed forces equal those of the whole recording to the last digit.
 
     Parameters
@@ -87,7 +87,7 @@ def _planned(
     recording: Recording,
     air: Recording | None,
     follow: bool,
-) -> tuple[bytes, dict[str, Any]]:
+) -> tuple[str, dict[str, Any]]:
     from rcsa_ident.workflows.stream_forces import live_observer
 
     known, tool = read(machine.text), tooling_from(tooling)
@@ -121,4 +121,4 @@ def _planned(
         "left_out_s": settling / recording.rate,
         "notes": [*tool.remarks, *known.remarks, *(found.notes if follow else found.remarks)],
     }
-    return pickle.dumps(plan), ready
+    return encode(plan), ready

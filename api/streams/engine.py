@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import pickle
 import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from api.codec import decode
 from rcsa_ident.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Message:
     Parameters
     ----------
     kind : int
-        OPEN: content is a `Plan`, pickled by one of the service's own workers. BLOCK: content is float64[samples, channels], `first`
+        OPEN: content is a `Plan`, encoded by one of the service's own workers. BLOCK: content is float64[samples, channels], `first`
         its index. FORCES: content is float64[samples, axes] of the block from `first` on, without those in which the observer
         settles, `drift` of the spindle's speed as a share, `known` 1 where the spindle's angle was. REFUSED: forces are not
         finite. FAILED: content is what is logged.
@@ -114,7 +114,7 @@ class Engine:
         """Return the answer to a message; an error ends its own session only."""
         try:
             if message.kind == OPEN:
-                plan: Plan = pickle.loads(message.content)
+                plan: Plan = decode(message.content.decode())
                 self.sessions[message.session] = plan, plan.observer.init()
             elif message.kind == CLOSE:
                 self.sessions.pop(message.session, None)

@@ -132,14 +132,14 @@ class Hub:
         self.metrics.missed(session.counts.lost - lost, dropped)
         self._feed(session)
 
-    def begin(self, session: Session, plan: bytes, origin: int, ready: Mapping[str, Any]) -> None:
+    def begin(self, session: Session, plan: str, origin: int, ready: Mapping[str, Any]) -> None:
         """Start the observer of a session at a waiting sample."""
         if session.stage is Stage.ENDED:
             return
         self.metrics.missed(0, session.skip(origin))
-        session.plan, session.stage, session.ready = plan, Stage.LIVE, dict(ready)
+        session.plan, session.stage, session.ready = plan.encode(), Stage.LIVE, dict(ready)
         session.notes = list(ready.get("notes", ()))
-        self.host.post(Message(OPEN, session.number, content=plan))
+        self.host.post(Message(OPEN, session.number, content=session.plan))
         for listener in session.listeners:
             listener.tell("ready", **session.ready)
         self._feed(session)

@@ -138,7 +138,7 @@ class Pool:
     def _fit(self, member: Worker) -> Worker:
         """Return a member that takes calls, or another in its place; the same where the pool ends."""
         with self.lock:
-            if self.threads is None or (member.fit and member.process.is_alive()):
+            if self.threads is None or (member.fit and member.process.alive):
                 return member
             member.end()
             self.members[self.members.index(member)] = other = self._worker()

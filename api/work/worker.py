@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Any
 
+from api.confined import Confined, Ended, Line
+from api.confinement import confine
 from api.log_lines import ids, telling
-from api.processes import Child, limit_memory, spawn_context
+from api.processes import limit, limit_memory
 from api.work.requests import TooLong
 from rcsa_ident.errors import InputError
 
@@ -48,8 +50,12 @@ class Killed(Exception):
     """The process of a call was killed from outside."""
 
 
+class Failed(Exception):
+    """A call has failed in its process, and no input is at fault."""
+
+
 class Worker:
-    """A spawned process and the pipe to it.
+    """A process of its own and the line to it; what it answers is JSON, so that tuples come as lists.
 
     Parameters
     ----------
@@ -60,44 +66,41 @@ class Worker:
 
     def __init__(self, limits: QueryLimits, prepare: Callable[[], None], spare: Callable[[], None]) -> None:
         self.limits, self.ready, self.fit, self.asked = limits, False, True, 0
-        self.pipe, theirs = spawn_context().Pipe()
-        self.process = Child(_serve, theirs, limits.memory, prepare, spare, name="worker")
-        theirs.close()
+        self.process = Confined(_serve, limits.memory, prepare, spare)
 
     def begin(self) -> None:
         """Wait until the process takes calls; raises `Killed` where it never will."""
         if self.ready or not self.fit:
             return
         try:
-            self.ready = self.pipe.poll(_START) and bool(self.pipe.recv())
-        except (EOFError, OSError):
+            self.ready = bool(self.process.receive(_START))
+        except (Ended, TimeoutError, ValueError):
             self.ready = False
         self.fit = self.ready
         if not self.fit:
             raise Killed
 
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        """Return the answer of a call, or raise what it raises.
+        """Return the answer of a call.
 
         Raises
         ------
         TooLong, InputError
-            The call has exceeded the limit of time, or of memory; the process is of no further use.
+            The call says so, or has exceeded the limit of time, or of memory; then the process is of no further use.
+        Failed
+            The call has raised something else.
         Killed
         """
-        kind, answer = "killed", None
         try:
-            self.pipe.send((call, arguments, ids()))
-            self.asked += 1
-            # what the process still prepares is not the call's time
-            if self.pipe.poll(_START) and self.pipe.recv():
-                kind, answer = self.pipe.recv() if self.pipe.poll(self.limits.seconds) else ("too long", None)
-        except (EOFError, OSError):
-            self.process.join(10.0)
-            if not self.process.killed:
-                # a library that ends the process where it gets no memory
-                kind = "too large"
-        self.fit = kind in ("answer", "raised")
+            kind, answer = self._outcome(call, arguments)
+            if kind == "refused":
+                answer = _refusal(*answer)
+            elif kind == "failed":
+                answer = _failure(*answer)
+        except (TypeError, ValueError):
+            # no answer
+            kind, answer = "killed", None
+        self.fit = kind in ("answer", "refused", "failed")
         if not self.fit:
             self.process.kill()
         if kind == "answer":
@@ -106,43 +109,70 @@ class Worker:
             raise self.limits.too_long
         if kind == "too large":
             raise self.limits.too_large
-        if kind == "killed":
-            raise Killed
-        assert isinstance(answer, Exception)
-        raise answer
+        if kind in ("refused", "failed"):
+            raise answer
+        raise Killed
+
+    def _outcome(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+        try:
+            self.process.send(call, arguments, ids())
+            self.asked += 1
+            # what the process still prepares is not the call's time
+            self.process.receive(_START)
+        except (Ended, TimeoutError):
+            return "killed", None
+        try:
+            kind, answer = self.process.receive(self.limits.seconds)
+            return kind, answer
+        except TimeoutError:
+            return "too long", None
+        except Ended:
+            # a library may end the process where it gets no memory
+            return "killed" if self.process.was_killed() else "too large", None
 
     def end(self) -> None:
         """End the process at once."""
-        self.process.kill()
-        self.process.join()
-        self.pipe.close()
+        self.process.end()
 
 
-def _serve(pipe: Connection, memory: int, prepare: Callable[[], None], spare: Callable[[], None]) -> None:
-    """In the process: answer calls until the pipe is closed."""
+def _refusal(field: str, found: object, allowed: str, where: str, seconds: float | None) -> InputError:
+    return InputError(field, found, allowed, where) if seconds is None else TooLong(field, found, allowed, where, seconds)
+
+
+def _failure(words: str, told: str) -> Failed:
+    error = Failed(words)
+    error.add_note(told)
+    return error
+
+
+def _serve(line: Line, memory: int, prepare: Callable[[], None], spare: Callable[[], None]) -> None:
+    """In the process: answer calls until the service ends it."""
     prepare()
     limit_memory(memory)
-    pipe.send(True)
-    if not pipe.poll():
+    line.follow()
+    # no further process of this user, and no thread, is started from here
+    limit("RLIMIT_NPROC", 0)
+    # its files stay open: what it compiles it keeps for all
+    confine(None)
+    line.tell("true")
+    if line.idle:
         spare()
     while True:
-        try:
-            call, arguments, known = pipe.recv()
-        except EOFError:
-            return
+        call, arguments, known = line.take()
         # it has begun
-        pipe.send(True)
+        line.tell("true")
         with telling(**known):
-            pipe.send(_answer(call, arguments))
+            line.tell(_answer(call, arguments))
 
 
-def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
     try:
-        return "answer", call(*arguments)
+        return json.dumps(["answer", call(*arguments)])
+    except InputError as error:
+        seconds = error.seconds if isinstance(error, TooLong) else None
+        return json.dumps(["refused", [error.field, error.found, error.allowed, error.where, seconds]], default=repr)
     except MemoryError:
-        return "too large", None
+        return json.dumps(["too large", None])
     except Exception as error:
-        if not isinstance(error, InputError):
-            # its traceback does not cross processes
-            error.add_note(traceback.format_exc())
-        return "raised", error
+        # its traceback does not cross processes
+        return json.dumps(["failed", [f"{type(error).__name__}: {error}", traceback.format_exc()]])

@@ -22,8 +22,9 @@ from hypothesis.extra import numpy as arrays
 
 import api
 import rcsa_ident
-from api.jobs import codec, identification, lobes, paths
-from api.jobs.codec import NOUNS, Unknown, _noun, decode, encode
+from api import codec
+from api.codec import NOUNS, Unknown, _noun, decode, encode
+from api.jobs import identification, lobes, paths
 from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
@@ -40,6 +41,7 @@ from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.plausibility import PlausibilityCode
 from rcsa_ident.remarks import Remark, RemarkCode
 from rcsa_ident.signals.verdict import RecordCode, Verdict
+from rcsa_ident.workflows.stream_forces import LiveObserver
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])
 ARRAYS = DTYPES.flatmap(lambda kind: arrays.arrays(kind, arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))
@@ -179,15 +181,15 @@ def reached(kind: Any, seen: set[Any]) -> set[Any]:
     return seen
 
 
-def test_all_that_jobs_are_asked_and_remember_is_known():
-    """Questions of lobes and paths, judged recordings, and what every task of an identification comes to."""
+def test_all_that_is_stored_or_handed_on_is_known():
+    """Questions of lobes and paths, judged recordings, what every task of an identification comes to, and plans of streams."""
     tasks = {each for each in classes() if isinstance(getattr(each, "phase", None), Phase)}
     assert len(tasks) >= 8
     roots = [get_type_hints(task.run)["return"] for task in tasks]
     roots += [hint for function in (lobes.asked, paths.asked) for hint in get_type_hints(function).values()]
     roots += [get_type_hints(identification._readings)["return"]]
     found = set[Any]()
-    for root in roots:
+    for root in (*roots, LiveObserver):
         reached(root, found)
     assert {AxisSearch, CoupledSearch, Candidate, CutSpec, LobeRequest, Verdict} <= found
     values = {each for each in found - PLAIN if not (getattr(each, "_is_protocol", False) or issubclass(each, ABC))}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
 
 import api.streams.design
 import api.work.forces
+from api.codec import decode
 from api.streams.design import StreamQuestion, design_replay
 from api.work.forces import ForceQuestion, forces
 from api.work.requests import MachineText, ToolingSource
@@ -55,7 +54,7 @@ def test_a_replayed_stream_is_the_record():
     cut, air = records()
     question = StreamQuestion(cut.rate, CASE.spindle_speed, cut.sensors, ("Y", "X"), "cut", "resonators")
     raw, ready = design_replay(MACHINE, TOOL, question, records)
-    plan = pickle.loads(raw)
+    plan = decode(raw)
     assert len(plan.observer.observer.filters) == 1
     state, found = plan.observer.init(), []
     for part in np.split(cut.samples, [700, 3000]):

@@ -14,12 +14,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from api.codec import encode
 from api.jobs import job_context as desks
 from api.jobs.backend import VERSION, Carried
-from api.jobs.codec import encode
 from api.jobs.job_context import JobContext
 from api.jobs.worker import LEASE, JobWorker, carry, process
 from api.security import new_id, now
+from api.serve import job_worker
+from api.settings import Settings
 from api.stores.entities import Machine
 from api.stores.jobs import Outcome, Worker
 from rcsa_ident.errors import InputError
@@ -205,6 +207,14 @@ def test_a_step_that_cannot_be_stored_loses_no_work(quiet, caplog):
     assert died_once_more() == 3
 
 
+def test_memory_of_jobs_is_limited(monkeypatch, tmp_path):
+    found = []
+    monkeypatch.setattr("api.processes.limit_memory", found.append)
+    monkeypatch.setattr("api.jobs.worker.JobWorker.run", lambda *_: None)
+    job_worker("path", Settings(data=tmp_path, job_memory=2345), None, None)
+    assert found == [2345]
+
+
 def test_refusals_are_remembered_as_such(quiet):
     def refuse():
         raise InputError("cuts", 3, "more", "here")
@@ -220,7 +230,10 @@ def test_refusals_are_remembered_as_such(quiet):
     [
         (InputError("cuts", "none", "some"), "cuts: found none, allowed is some"),
         (RuntimeError("secret detail"), "an internal error occurred; it is logged under this job's id"),
-        (MemoryError(), "an internal error occurred; it is logged under this job's id"),
+        (
+            MemoryError(),
+            "job: found one that needs more memory than the service allows, allowed is a smaller one, or a larger RCSA_IDENT_JOB_MEMORY",
+        ),
     ],
 )
 @pytest.mark.parametrize("inside", [True, False])
@@ -238,9 +251,10 @@ def test_a_job_that_fails_says_why(store, machine, fault, words, inside, caplog)
     assert found.state == "failed"
     assert json.loads(found.problem)["detail"] == words
     assert "secret" not in found.problem
-    entries = json.loads(found.problem)["errors"]
-    assert entries == ([{"field": "cuts", "found": "none", "allowed": "some"}] if isinstance(fault, InputError) else [])
-    assert isinstance(fault, InputError) or "Error" in caplog.text
+    entries = [list(each.values()) for each in json.loads(found.problem)["errors"]]
+    refused = {InputError: fault, MemoryError: desks.TOO_LARGE}.get(type(fault))
+    assert entries == ([] if refused is None else [[refused.field, refused.found, refused.allowed]])
+    assert refused or "Error" in caplog.text
 
 
 def test_a_job_that_is_cancelled_stops_where_it_looks_up(quiet):

@@ -10,8 +10,8 @@ from functools import partial
 import pytest
 
 from api.client import Client, ServiceError
+from api.codec import decode
 from api.jobs import job_context, lobes
-from api.jobs.codec import decode
 from api.jobs.worker import carry
 from api.schemas.jobs import PartialLobes
 from api.schemas.robots import EXAMPLE as ROBOT

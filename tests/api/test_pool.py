@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -15,7 +16,7 @@ import pytest
 
 from api.work.pool import Busy, Pool, guarded
 from api.work.requests import TooLong
-from api.work.worker import QueryLimits, Worker
+from api.work.worker import Failed, QueryLimits, Worker
 from rcsa_ident.errors import InputError
 from tests.fixtures.waiting import ended, until
 
@@ -36,6 +37,23 @@ def pool():
     found.stop()
 
 
+class Runs:
+    """What would call something where it is unpickled."""
+
+    def __reduce__(self):
+        return os._exit, (7,)
+
+
+def no_json():
+    return Runs()
+
+
+def leaves():
+    if sys.platform != "linux":
+        raise OSError("Function not implemented")
+    socket.socket()
+
+
 def too_much():
     return len(bytearray(3 << 30))
 
@@ -51,6 +69,11 @@ def test_answers_and_refusals_come_back(pool):
     assert asyncio.run(pool.run(os.getpid)) != os.getpid()
     with pytest.raises(InputError, match="field: found x, allowed is y"):
         asyncio.run(pool.run(wrong))
+    # JSON alone, and no way out
+    assert asyncio.run(pool.run(divmod, 7, 2)) == [3, 1]
+    for call, words in ((no_json, "TypeError"), (leaves, "Function not implemented"), (bug, "a bug")):
+        with pytest.raises(Failed, match=words):
+            asyncio.run(pool.run(call))
     assert pool.waiting == 0
     assert pool.ready
 
@@ -132,7 +155,7 @@ def test_a_query_that_nobody_waits_for_ends_with_its_process(pool):
 @pytest.mark.slow
 def test_a_process_that_was_killed_while_idle_costs_nothing(pool):
     os.kill(asyncio.run(pool.run(os.getpid)), signal.SIGKILL)
-    until(lambda: not pool.members[0].process.is_alive())
+    until(lambda: not pool.members[0].process.alive)
     assert asyncio.run(pool.run(pow, 2, 5)) == 32
 
 

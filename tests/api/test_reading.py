@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import importlib
+import io
 import json
 import os
 import shutil
@@ -13,30 +15,24 @@ import sys
 import tempfile
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
-import h5py
 import numpy as np
+import psutil
 import pytest
 
+from api.confined import Confined
 from api.files import Full
-from api.reading.previews import envelope, spectrum
 from api.reading.reader import Limits, Reader, _answer
-from api.reading.samples import blocks, length, read_normalised, write_normalised
+from api.reading.room import Room
+from api.reading.samples import write_normalised
 from api.work.pool import Busy
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import in_si
-from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.waiting import PATIENCE, ended, until
 
 LIMITS = Limits(memory=512, seconds=1.0, wall_seconds=60.0, calls=50)
 COSTLY = "costs more than 512 MiB or 1 s to read"
-SENSORS = (
-    Sensor("a/b", Quantity.DISPLACEMENT, Dof.X, 1.0e4, delay=1e-5, bandwidth=1e4),
-    Sensor(".", Quantity.ACCELERATION, Dof.Y, 1.1094e-3),
-    Sensor("trigger", Quantity.TRIGGER, pulses_per_revolution=2, tooth_angle=0.5),
-)
 
 
 def nothing():
@@ -129,7 +125,11 @@ def lines_of(text, path, other):
 @pytest.fixture(scope="module")
 def reader():
     found = Reader(LIMITS, 1, nothing)
-    found.start()
+    with pytest.MonkeyPatch.context() as secret:
+        secret.setenv("RCSA_IDENT_DATABASE", "postgresql://service:password@host/store")
+        secret.setenv("PGPASSWORD", "password")
+        found.start()
+        assert ask(found, pow, 2, 5) == 32
     yield found
     found.stop()
 
@@ -172,7 +172,7 @@ def full():
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 def test_a_full_disk_is_no_fault_of_the_file(reader):
-    assert json.loads(_answer(full, ())) == ["full", ""]
+    assert json.loads(_answer(full, (), {})) == ["full", ""]
     with pytest.raises(Full):
         ask(reader, no_space)
 
@@ -190,11 +190,11 @@ def test_what_sleeps_is_ended_by_the_clock():
 @pytest.mark.slow
 def test_what_is_allowed_is_counted_for_each_alone(reader):
     """Not together: the process lives on."""
-    first = ask(reader, os.getpid)
+    first = reader.child.process.pid
     for _ in range(4):
         ask(reader, much, 300)
         ask(reader, _burn, 0.4)
-    assert ask(reader, os.getpid) == first
+    assert reader.child.process.pid == first
 
 
 def _burn(seconds):
@@ -229,6 +229,110 @@ def test_a_call_sees_its_files_alone(reader, tmp_path):
     room = reader.child.room
     assert not list(room.given.iterdir())
     assert not list(room.made.iterdir())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sessions and limits of POSIX, and the kernel's own means")
+def test_a_process_is_told_nothing_and_alone_in_its_session(reader):
+    environment, threads, files = ask(reader, about_itself)
+    assert {"RCSA_IDENT_DATABASE", "PGPASSWORD"}.isdisjoint(environment)
+    assert "password" not in json.dumps(environment)
+    assert environment["OMP_NUM_THREADS"] == "1"
+    assert os.getsid(reader.child.process.pid) == reader.child.process.pid
+    assert threads == [0, 0]
+    # the log twice, and where its answer goes
+    assert len(files) == 3
+
+
+def about_itself():
+    def is_open(number):
+        try:
+            return bool(os.fstat(number))
+        except OSError:
+            return False
+
+    limits = importlib.import_module("resource")
+    return [dict(os.environ), limits.getrlimit(limits.RLIMIT_NPROC), [each for each in range(256) if is_open(each)]]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a copy of the process answers each call")
+def test_no_call_sees_what_another_has_left(reader):
+    """A file that has taken the process over has taken over its own call, and cannot answer the next one."""
+    ask(reader, leave_something)
+    assert not ask(reader, is_left)
+    with pytest.raises(InputError, match=COSTLY):
+        ask(reader, answer_twice)
+    assert ask(reader, pow, 2, 5) == 32
+    assert len({ask(reader, os.getpid) for _ in range(3)}) == 3
+    assert reader.child.held.whole
+
+
+def leave_something():
+    os.left = True
+
+
+def is_left():
+    return hasattr(os, "left")
+
+
+def answer_twice():
+    """On every line that is open."""
+    for number in range(3, 64):
+        with suppress(OSError):
+            os.write(number, b'["answer", 1]\n["answer", 2]\n')
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel's own means")
+def test_a_stored_file_stays_as_it_is(reader, tmp_path):
+    """Its process is given a second name of it, not a copy, which takes time and room; where no filter holds it is a copy."""
+    path = tmp_path / "stored.csv"
+    path.write_text("stored")
+    before = path.stat()
+    for call in (_spoil_mode, os.utime, _spoil_owner):
+        with pytest.raises(InputError, match="cannot be read"):
+            ask(reader, call, path)
+    after = path.stat()
+    assert (after.st_mode, after.st_mtime_ns, after.st_uid) == (before.st_mode, before.st_mtime_ns, before.st_uid)
+    assert ask(reader, names_of, path) == 2
+    room = Room(tmp_path / "room")
+    (seen,) = room.take_in((path,))
+    assert (seen.read_text(), names_of(seen)) == ("stored", 1)
+
+
+def _spoil_mode(path):
+    path.chmod(0)
+
+
+def _spoil_owner(path):
+    os.chown(path, os.getuid(), os.getgid())
+
+
+def names_of(path):
+    return path.stat().st_nlink
+
+
+def test_what_is_no_answer_ends_its_process(reader, monkeypatch):
+    """As of a process that a file has taken over."""
+    for said in ("[", "1", '["answer"]', '["refused", 1]', '["refused", ["too", "few"]]', "[" * 100_000):
+        with monkeypatch.context() as taken_over:
+            taken_over.setattr(reader.child.process.process, "stdout", io.BytesIO(said.encode() + b"\n"))
+            assert reader.child.ask(pow, (2, 5)) == ("costly", None)
+        assert reader.child.ended
+    reader._replace()
+    assert ask(reader, pow, 2, 5) == 32
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="a system without groups of processes")
+def test_a_process_ends_with_all_that_it_has_started():
+    found = Confined(_starts_another)
+    other = found.receive(PATIENCE)
+    assert not ended(other)
+    found.end()
+    until(lambda: ended(other))
+
+
+def _starts_another(line):
+    with subprocess.Popen(["sleep", "1000"]) as other:
+        line.tell(json.dumps(other.pid))
 
 
 def test_rooms_of_a_killed_service_are_removed(tmp_path):
@@ -299,7 +403,7 @@ def test_after_so_many_calls_comes_a_new_process():
     with pytest.raises(Busy):
         ask(found, os.getpid)
     found.start()
-    pids = [ask(found, os.getpid) for _ in range(5)]
+    pids = [(found.child.process.pid, ask(found, pow, 2, 5))[0] for _ in range(5)]
     found.stop()
     assert pids[0] == pids[1] != pids[2] == pids[3] != pids[4]
     with pytest.raises(Busy):
@@ -326,13 +430,15 @@ def test_the_end_waits_for_nobody():
 
 
 CODE = """
-import asyncio, os, time
-from api.reading.reader import Limits, Reader, _answer
+import asyncio, time
+from api.reading.reader import Limits, Reader
+from tests.api.test_reading import nothing
 if __name__ == "__main__":
-    reader = Reader(Limits(), 1)
+    reader = Reader(Limits(), 1, nothing)
     reader.start()
-    print(asyncio.run(reader.run(os.getpid)), flush=True)
-    time.sleep(60)
+    assert asyncio.run(reader.run(pow, 2, 5)) == 32
+    print(reader.child.process.pid, flush=True)
+    asyncio.run(reader.run(time.sleep, 1000.0))
 """
 
 
@@ -342,114 +448,11 @@ def test_the_process_ends_with_the_service_however_it_ends(tmp_path):
     script.write_text(CODE, encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment) as service:
-        child = int(service.stdout.readline())
+        child = psutil.Process(int(service.stdout.readline()))
+        # on Linux a copy of it answers
+        copies = until(child.children) if sys.platform == "linux" else []
         service.kill()
-    until(lambda: ended(child))
-
-
-@pytest.mark.parametrize("kind", ["f4", "f8", "i2", "u1", "i8", "exact f8"])
-def test_samples_stay_as_they_were_to_the_last_bit(tmp_path, kind):
-    rng = np.random.default_rng(2)
-    values = rng.standard_normal((3, 5000)) * 100.0
-    if kind == "exact f8":
-        values = values.astype("f4").astype("f8")
-    signals = [each.astype(kind.split()[-1]) for each in values]
-    if "f" in kind:
-        signals[0][7], signals[0][8], signals[1][0] = np.nan, np.inf, -0.0
-    path = tmp_path / "x.h5"
-    write_normalised(path, 51200.0, signals, SENSORS)
-    found = read_normalised(path)
-    direct = in_si(51200.0, signals, SENSORS)
-    assert found.sensors == SENSORS
-    assert found.rate == 51200.0
-    assert found.samples.tobytes() == direct.samples.tobytes()
-    assert np.isnan(found.samples[[7, 8], 0]).all() == ("f" in kind)
-    # half the size where nothing is lost by it
-    assert path.stat().st_size < 3 * 5000 * (4 if kind in ("f4", "i2", "u1", "exact f8") else 8) + 20_000
-
-
-@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="a system that allocates nothing in advance")
-@pytest.mark.parametrize(("count", "rate"), [(1, 1000.0), (5000, 1000.0), (70_000, 1.0), (1_000_001, 51200.0), (100, 1e7)])
-@pytest.mark.parametrize("kind", ["f4", "f8"])
-def test_room_for_samples_is_allocated_before_the_first_is_written(tmp_path, monkeypatch, count, rate, kind):
-    path, allocated, allocate = tmp_path / "x.h5", [], os.posix_fallocate
-
-    def noted(file, start, size):
-        allocated.append(size)
-        allocate(file, start, size)
-
-    monkeypatch.setattr(os, "posix_fallocate", noted)
-    values = np.random.default_rng(3).standard_normal(count).astype(kind)
-    write_normalised(path, rate, [values] * len(SENSORS), SENSORS)
-    with h5py.File(path) as file:
-        written = file.id.get_filesize()
-    # all of it, and nothing of what was too much stays
-    assert allocated[0] >= path.stat().st_size == written
-    monkeypatch.setattr(os, "posix_fallocate", lambda *_: no_space())
-    with pytest.raises(OSError, match="no space left"):
-        write_normalised(path, rate, [values] * len(SENSORS), SENSORS)
-
-
-def test_samples_can_be_read_in_parts(tmp_path):
-    path = tmp_path / "x.h5"
-    signals = list(np.arange(3 * 2500.0).reshape(3, 2500))
-    write_normalised(path, 1000.0, signals, SENSORS)
-    assert length(path) == (1000.0, 2500)
-    parts = list(blocks(path, 700))
-    assert [start for start, _ in parts] == [0, 700, 1400, 2100]
-    np.testing.assert_array_equal(np.concatenate([part.samples for _, part in parts]), read_normalised(path).samples)
-
-
-def test_damaged_samples_are_noticed(tmp_path):
-    path = tmp_path / "x.h5"
-    write_normalised(path, 1000.0, [np.random.default_rng(1).standard_normal(5000) for _ in SENSORS], SENSORS)
-    raw = bytearray(path.read_bytes())
-    raw[len(raw) // 2] ^= 1
-    path.write_bytes(raw)
-    with pytest.raises(InputError):
-        read_normalised(path)
-    for content in (b"", b"x" * 100):
-        path.write_bytes(content)
-        with pytest.raises(InputError, match="missing or damaged"):
-            read_normalised(path)
-    path.unlink()
-    with pytest.raises(InputError, match="missing or damaged"):
-        read_normalised(path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("count", "points"), [(1, 10), (9, 10), (10, 10), (11, 10), (2_500_000, 1000)])
-def test_an_outline_holds_every_extreme(tmp_path, count, points):
-    path = tmp_path / "x.h5"
-    rng = np.random.default_rng(4)
-    x = rng.standard_normal(count)
-    write_normalised(path, 1000.0, [x], SENSORS[2:])
-    found = envelope(path, points)
-    low, high = (np.array(found["channels"]["trigger"][key]) for key in ("low", "high"))
-    assert low.size == high.size == len(found["time_s"]) <= points
-    width = -(-count // points)
-    for k in {0, low.size // 2, low.size - 1}:
-        part = x[k * width : (k + 1) * width]
-        assert (low[k], high[k]) == (part.min(), part.max())
-        assert found["time_s"][k] == pytest.approx(k * width / 1000.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [1, 2, 3, 1000, 51200])
-def test_a_tone_stands_at_its_place_with_its_amplitude(tmp_path, count):
-    path = tmp_path / "x.h5"
-    time = np.arange(count) / 51200.0
-    write_normalised(path, 51200.0, [0.25 * np.cos(2.0 * np.pi * 1600.0 * time) + 3.0], SENSORS[2:])
-    found = spectrum(path, 6000.0, 500)
-    amplitude = np.array(found["channels"]["trigger"]["amplitude"])
-    assert amplitude.size <= 500
-    if count >= 1000:
-        strongest = int(np.argmax(amplitude))
-        # between two of its frequencies the window loses 15 %
-        assert 0.84 * 0.25 <= amplitude[strongest] <= 1.001 * 0.25
-        assert found["frequency_hz"][strongest] == pytest.approx(1600.0, abs=60.0)
-    assert found["harmonics_hz"][:2] == [100.0, 200.0]
-    assert max(found["harmonics_hz"]) <= 25600.0
+    until(lambda: all(ended(each.pid) for each in (child, *copies)))
 
 
 KNOWN_KERNELS = """

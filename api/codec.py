@@ -1,4 +1,4 @@
-"""Nouns as JSON and back, to the last bit: what a job remembers of itself. No code is in it, and only known nouns come out of it."""
+"""Nouns as JSON and back, to the last bit: what jobs remember, and plans of streams. Without code; only known nouns come out of it."""
 
 from __future__ import annotations
 
@@ -53,6 +53,21 @@ NOUNS = {
     "ToolingSource": "api.work.requests.ToolingSource",
     "LobeRequest": "api.work.requests.LobeRequest",
     "PathRequest": "api.work.paths.PathRequest",
+    "Plan": "api.streams.engine.Plan",
+    "Column": "api.streams.engine.Column",
+    "LiveObserver": "rcsa_ident.workflows.stream_forces.LiveObserver",
+    "AngleReference": "rcsa_ident.workflows.stream_forces.AngleReference",
+    "ForceObserver": "rcsa_ident.observer.force.ForceObserver",
+    "AxisObserver": "rcsa_ident.observer.force.AxisObserver",
+    "RunOut": "rcsa_ident.observer.force.RunOut",
+    "TransferFunction": "rcsa_ident.observer.transfer_function.TransferFunction",
+    "SampledModes": "rcsa_ident.observer.transfer_function.SampledModes",
+    "RationalFit": "rcsa_ident.dynamics.rational.RationalFit",
+    "FitStatus": "rcsa_ident.dynamics.rational.FitStatus",
+    "KalmanFilter": "rcsa_ident.observer.kalman.KalmanFilter",
+    "AugmentedModel": "rcsa_ident.observer.force_model.AugmentedModel",
+    "CoupledFilter": "rcsa_ident.observer.coupled_filter.CoupledFilter",
+    "CoupledModel": "rcsa_ident.observer.coupled_model.CoupledModel",
 }
 _NAMES = {place: name for name, place in NOUNS.items()}
 
