@@ -58,7 +58,7 @@ NOUNS = {
     "LiveObserver": "rcsa_ident.workflows.stream_forces.LiveObserver",
     "AngleReference": "rcsa_ident.workflows.stream_forces.AngleReference",
     "ForceObserver": "rcsa_ident.observer.force.ForceObserver",
-    "AxisObserver": "rcsa_ident.observer.force.AxisObserver",
+    "AxisSensors": "rcsa_ident.observer.force.AxisSensors",
     "RunOut": "rcsa_ident.observer.force.RunOut",
     "TransferFunction": "rcsa_ident.observer.transfer_function.TransferFunction",
     "SampledModes": "rcsa_ident.observer.transfer_function.SampledModes",
@@ -66,8 +66,6 @@ NOUNS = {
     "FitStatus": "rcsa_ident.dynamics.rational.FitStatus",
     "KalmanFilter": "rcsa_ident.observer.kalman.KalmanFilter",
     "AugmentedModel": "rcsa_ident.observer.force_model.AugmentedModel",
-    "CoupledFilter": "rcsa_ident.observer.coupled_filter.CoupledFilter",
-    "CoupledModel": "rcsa_ident.observer.coupled_model.CoupledModel",
 }
 _NAMES = {place: name for name, place in NOUNS.items()}
 
