@@ -28,6 +28,8 @@ RETRY = {"Retry-After": "2"}
 DROPPED, DROP_SECONDS = 1_000_000, 1.0
 #: Time limit of a body that is not an upload [s], its extension per received byte [s], and time limit [s] and size of a request's head.
 BODY_SECONDS, BYTE_SECONDS, HEAD_SECONDS, HEAD_BYTES = 60.0, 1e-4, 20.0, 262_144
+#: Time limit of an answer that its client does not read [s], extended by `BYTE_SECONDS` for each byte that waits.
+UNREAD_SECONDS = 120.0
 
 
 class AccessMonitor:
@@ -143,9 +145,10 @@ class _Body:
 
 
 class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
-    """HTTP connection that is closed when the head of a request takes too long or grows too large."""
+    """HTTP connection that is closed when the head of a request takes too long or grows too large, or its answer is read too slowly."""
 
-    seconds, most = HEAD_SECONDS, HEAD_BYTES
+    seconds, most, unread_seconds = HEAD_SECONDS, HEAD_BYTES, UNREAD_SECONDS
+    unread: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
@@ -169,8 +172,28 @@ class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
         if self.transport.get_protocol() is self:
             self.transport.close()
 
+    def pause_writing(self) -> None:
+        # until the client has read, memory holds the answer
+        seconds = self.unread_seconds + BYTE_SECONDS * self.transport.get_write_buffer_size()
+        self.unread = self.loop.call_later(seconds, self._too_slow)
+        super().pause_writing()
+
+    def resume_writing(self) -> None:
+        self._forget_unread()
+        super().resume_writing()
+
+    def _too_slow(self) -> None:
+        if self.transport.get_protocol() is self:
+            # closing would wait for the client to read the rest
+            self.transport.abort()
+
+    def _forget_unread(self) -> None:
+        if self.unread is not None:
+            self.unread.cancel()
+
     def connection_lost(self, exc: Exception | None) -> None:
         self.waiting.cancel()
+        self._forget_unread()
         super().connection_lost(exc)
 
 

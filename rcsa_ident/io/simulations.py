@@ -28,6 +28,8 @@ from rcsa_ident.virtual.robot import robot_cut_id
 from rcsa_ident.virtual.sensors import accelerometer_places
 
 Progress = Callable[[int, int], None]
+#: Files and rows of a campaign are named by its toolings: no folder elsewhere, no formula of a spreadsheet.
+_FILE_NAME = re.compile(r"\w[\w .+()-]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,10 +206,12 @@ def write_robot_campaign(
 
 
 def _write_head(runs: Path, toolings: Mapping[Path, Tooling]) -> None:
-    """Folders, and the toolings' files."""
+    """Folders, and the toolings' files; refuses a tooling's name that names no file."""
     for part in ("recordings", "toolings"):
         (runs / part).mkdir()
     for path, tooling in toolings.items():
+        if not _FILE_NAME.fullmatch(tooling.name):
+            raise InputError("name", tooling.name, "letters, digits, blanks and . _ + ( ) -, with a letter or digit in front", str(path))
         # where the schema for editors lies is another way from there
         text = path.read_text("utf-8-sig")
         write_text(runs / "toolings" / f"{tooling.name}.toml", re.sub(r"\A#:schema .*\n", "", text))

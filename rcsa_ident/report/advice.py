@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
+from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid, letters
 from rcsa_ident.report.lobes import _CURVES, _GREEN, _RED, stability_figure
 from rcsa_ident.stability.advice import Advice, PlannedCut, UsableDepths
 from rcsa_ident.stability.operating_point import OperatingPoint
@@ -133,7 +133,7 @@ def comparison_figure(curves: Mapping[str, UsableDepths], marks: Mapping[str, Ma
             colour, dashes = _CURVES[i % len(_CURVES)], ("-", "--", ":")[i // len(_CURVES) % 3]
             speed = to_rpm(depths.spindle_speed)
             top.plot(speed, 1e3 * depths.limit, dashes, color=colour, lw=0.8, alpha=0.6)
-            top.plot(speed, 1e3 * depths.depth, dashes, color=colour, label=name.replace("$", r"\$"))
+            top.plot(speed, 1e3 * depths.depth, dashes, color=colour, label=letters(name))
             bottom.plot(speed, to_cm3_per_min(depths.removal), dashes, color=colour)
             if name in marks:
                 mark = marks[name]

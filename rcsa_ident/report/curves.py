@@ -11,7 +11,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.report.figures import _STYLE, COLOURS, _grid, _without_jumps, tooltip_frf, wide
+from rcsa_ident.report.figures import _STYLE, COLOURS, _grid, _without_jumps, letters, tooltip_frf, wide
 from rcsa_ident.report.lobes import _CURVES
 from rcsa_ident.report.summaries import entries_of
 from rcsa_ident.signals.recording import Quantity, Recording
@@ -138,7 +138,7 @@ def recording_figure(recording: Recording, seconds: float = 0.05, start: float |
             for i, sensor in enumerate(recording.sensors):
                 if sensor.quantity is quantity:
                     colour = COLOURS.get(str(sensor.axis or "").upper(), "#52606d")
-                    ax.plot(time[shown], scale * recording.samples[shown, i], color=colour, lw=1.0, label=sensor.name)
+                    ax.plot(time[shown], scale * recording.samples[shown, i], color=colour, lw=1.0, label=letters(sensor.name))
             ax.set_ylabel(name)
             ax.legend(loc="upper right", ncols=3)
         grid[-1, 0].set_xlabel("time [s]")

@@ -89,6 +89,11 @@ def svg(figure: Figure, name: str) -> str:
     return re.sub(r"<metadata>.*?</metadata>\s*", "", content, flags=re.DOTALL)
 
 
+def letters(name: str) -> str:
+    """Return a label that shows a name letter by letter: matplotlib takes what stands between two dollar signs for a formula."""
+    return name.replace("$", r"\$")
+
+
 def _grid(
     rows: int, cols: int, height: float, ratios: Sequence[float] | None = None, sharey: Literal["row", "none"] = "row"
 ) -> tuple[Figure, np.ndarray]:

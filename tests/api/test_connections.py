@@ -21,7 +21,7 @@ from tests.fixtures.waiting import PATIENCE, until
 
 
 class Hasty(TimedHeadProtocol):
-    seconds, most = 0.6, 20_000
+    seconds, most, unread_seconds = 0.6, 20_000, 0.3
 
 
 @contextmanager
@@ -263,3 +263,47 @@ def test_a_websocket_stays_open():
             time.sleep(1.0)
             link.send(word)
             assert link.recv() == word
+
+
+def large(parts):
+    """An application that answers 20 MB in so many parts."""
+
+    async def app(scope, receive, send):
+        if scope["type"] == "lifespan":
+            await lasting(receive, send)
+            return
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"20000000")]})
+        for k in range(parts):
+            await send({"type": "http.response.body", "body": bytes(20_000_000 // parts), "more_body": k < parts - 1})
+
+    return app
+
+
+@pytest.mark.parametrize("parts", [1, 40], ids=["whole", "in parts"])
+def test_an_answer_that_is_read_byte_by_byte_is_given_up(parts, monkeypatch):
+    """And its memory with it."""
+    monkeypatch.setattr(access, "BYTE_SECONDS", 1e-9)
+    counted = Connections()
+    with listening(large(parts), counted=counted) as port, socket.socket() as link:
+        # else the kernel takes what nobody has read
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        link.connect(("127.0.0.1", port))
+        link.sendall(GET + b"\r\n")
+        until(lambda: counted.open.total())
+        with suppress(ConnectionResetError):
+            until(lambda: link.recv(1) and not counted.open.total())
+        until(lambda: not counted.open.total())
+
+
+def test_an_answer_that_was_read_is_not_given_up_later():
+    made = []
+
+    class Kept(TimedHeadProtocol):
+        def connection_made(self, transport):
+            super().connection_made(transport)
+            made.append(self)
+
+    with listening(large(1), Kept) as port, socket.create_connection(("127.0.0.1", port)) as link:
+        link.sendall(GET + b"Connection: close\r\n\r\n")
+        assert sum(iter(lambda: len(link.recv(1_000_000)), 0)) > 20_000_000
+    assert made[0].unread.cancelled()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 
 import pytest
 from fastapi.testclient import TestClient
@@ -209,3 +212,30 @@ def test_a_result_says_by_whom_it_was_taught(client, result):
     assert client.machine(machine).identification.taught_by == ["new tool (c1)"]
     for wrong in ("c1", [1], ["c"] * 201):
         assert refused(422, client.identify, machine, json.dumps(data | {"taught_by": wrong})).errors[0].field.startswith("taught_by")
+
+
+def test_two_who_take_over_at_once_teach_the_machine_once(client, result, monkeypatch):
+    """Both have computed the same from the same before either writes."""
+    machine = client.make_machine("HPM").id
+    client.identify(machine, result)
+    client.write_tooling("T7", further_cuts.drawn())
+    campaign = client.make_campaign(machine, further_cuts.campaign()).id
+    together = Barrier(2)
+    taught = {"text": json.dumps(json.loads(result) | {"taught_by": [f"new tool ({campaign})"]}), "summary": {}}
+    stiffer = further_cuts.drawn() | {"contact": {key: 2.0 * value for key, value in further_cuts.drawn()["contact"].items()}}
+    found = {
+        "status": "converged", "model_error": [], "notes": [], "left_out": [], "warnings": [], "taught": taught,
+        "toolings": [{"name": "T7", "contradiction": "", "learned": [], "tooling": stiffer}],
+    }  # fmt: skip
+
+    async def learned(*arguments):
+        await asyncio.to_thread(together.wait)
+        return found
+
+    monkeypatch.setattr("api.routes.learning._learned", learned)
+    with ThreadPoolExecutor(2) as threads:
+        path = f"/v1/campaigns/{campaign}/learn/take-over?machine=true"
+        answers = list(threads.map(lambda _: client.http.post(path), range(2)))
+    assert sorted(answer.status_code for answer in answers) == [200, 412]
+    assert [change.action for change in client.changes(kind="tooling", name="T7")] == ["changed", "made"]
+    assert [change.action for change in client.changes(kind="identification")] == ["changed", "made"]

@@ -227,17 +227,20 @@ def test_keys_scopes_and_groups(keyed):
         until(socket, "opened")
 
 
-def test_a_key_that_is_withdrawn_ends_its_stream(keyed, monkeypatch):
+def test_a_stream_ends_with_its_key(keyed, monkeypatch):
+    """A viewer's is withdrawn, the sender's expires by the clock."""
     monkeypatch.setattr("api.live.stream_connection.LOOK", 0.1)
     http, id, keys = keyed
+    store = http.app.state.components.store
+    made, day = make_key("local", ("run",), "a day", days=1.0)
+    store.keys.add(made)
     with http.websocket_connect(STREAM) as socket, http.websocket_connect(STREAM) as viewer:
-        socket.send_json(hello(id, key=keys["run"]))
+        socket.send_json(hello(id, key=day))
         session = until(socket, "opened")[0]["session"]
         viewer.send_json({"watch": session, "key": keys["read"]})
         until(viewer, "watching")
-        store = http.app.state.components.store
         store.keys.delete("local", keys["read"].split("_")[1])
         assert closed(viewer)[1]["status"] == 401
         assert session in http.app.state.components.streams.sessions
-        store.keys.delete("local", keys["run"].split("_")[1])
+        monkeypatch.setattr("api.security.now", lambda: made.expires)
         assert closed(socket)[1]["status"] == 401

@@ -159,3 +159,9 @@ def test_the_vendored_files_are_the_published_ones():
     for row in rows:
         assert hashlib.sha256((VENDOR / row["file"]).read_bytes()).hexdigest() == row["sha256"], row["file"]
         assert row["licence"] == "Apache-2.0"
+
+
+def test_the_tests_that_guarantees_name_are_there():
+    named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", (ROOT / "docs" / "guarantees.md").read_text(encoding="utf-8"))
+    assert len(named) > 30
+    assert [(file, name) for file, name in named if (f"def {name}(" if name else "") not in (ROOT / file).read_text(encoding="utf-8")] == []

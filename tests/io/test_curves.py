@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -51,6 +53,7 @@ def test_frf_of_one_axis(tmp_path):
         (([1.0, 2.0], {"X": [1.0, np.nan]}), "row 2: column X_re: found nan"),
         (([1.0], {"X": [1.0]}, {"X_re": [1.0]}), "column: found X_re"),
         (([1.0], {"X": [1.0]}, {"a,b": [1.0]}), "column: found a,b"),
+        *((([1.0], {"X": [1.0]}, {f" {sign}1+1": [1.0]}), f"column: found  {re.escape(sign)}1.*allowed is a name") for sign in "=+-@"),
         (([1.0], {"X": [1.0]}, {"b": [np.inf]}), "column b: found inf"),
     ],
 )
