@@ -12,13 +12,14 @@ from fastapi.openapi.utils import get_openapi
 
 from api import data_folder, problems
 from api.access import AccessMonitor
-from api.components import Components, Rates
+from api.components import Components
 from api.files import Files
 from api.head_requests import HeadRequests
 from api.jobs import leases
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
 from api.metrics import JobCounts, Metrics
+from api.rates import Rates
 from api.reading.example_campaign import Examples
 from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads

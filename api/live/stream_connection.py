@@ -161,6 +161,8 @@ async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text
         if session.counts.following >= 0 and ahead > MOST_AHEAD * session.about.rate:
             raise InputError("first", first, f"an index at most an hour ahead of the last one, {session.counts.following}")
         hub.offer(session, first, samples)
+        # frames that have come together are taken one by one, others' requests between them
+        await asyncio.sleep(0.0)
     await finish(hub, session)
 
 
@@ -181,7 +183,7 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
     hub, loop = components.streams, asyncio.get_running_loop()
     limit, refused = loop.time() + SETTLING, None
     while session.stage is not Stage.LIVE:
-        window = (0, None) if opening.source is not None else session.window(opening.settle)
+        window = (0, None) if opening.source is not None else hub.window(session, opening.settle)
         if session.stage is Stage.ENDED:
             return
         if window is None and session.finishing:
@@ -190,7 +192,12 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
             return
         if window is None:
             session.arrived.clear()
-            await session.arrived.wait()
+            try:
+                async with asyncio.timeout_at(limit):
+                    await session.arrived.wait()
+            except TimeoutError:
+                found = f"no {opening.settle} samples without a gap within {SETTLING:g} s"
+                raise refused or InputError("samples", found, "samples without gaps, until the observer is made") from None
             continue
         session.stage = Stage.DESIGNING
         try:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from api.metrics import Metrics
+from api.rates import Rates
 from api.shares import Shares
 from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, REFUSED, Message
 from api.streams.listener import Listener
@@ -22,8 +23,9 @@ from api.streams.session import About, End, Session, Stage
 from rcsa_ident.arrays import FloatArray
 
 log = logging.getLogger("rcsa_ident.service")
-#: Most frames of a session per second: each costs as much as hundreds of samples.
-MOST_FRAMES = 2000
+#: Most frames of a session per second, each of which costs as much as hundreds of samples, and the seconds that may come at once: behind
+#: a pause of the network, or of this process, frames come that were sent in time.
+MOST_FRAMES, PAUSED = 2000, 5
 _UNEXPECTED = "an internal error occurred; it is logged under this session's id"
 
 
@@ -68,6 +70,7 @@ class Hub:
     def __init__(self, host: Host, limits: StreamLimits, metrics: Metrics) -> None:
         self.host, self.limits, self.metrics = host, limits, metrics
         self.places = Shares(limits.sessions, limits.several)
+        self.pace = Rates(60 * MOST_FRAMES, PAUSED * MOST_FRAMES)
         self.sessions: dict[str, Session] = {}
         self.numbers = itertools.count(1)
         self.by_number: dict[int, Session] = {}
@@ -125,12 +128,22 @@ class Hub:
             self.metrics.missed(0, session.held)
 
     def offer(self, session: Session, first: int, samples: FloatArray) -> None:
-        """Take a frame from a session's client."""
-        session.frames += 1
+        """Take a frame from a session's client; too many of them end the session."""
+        if self.pace.wait(session.about.id):
+            detail = f"more than {MOST_FRAMES} frames per second: send more samples per frame"
+            self.close(session, End(1008, 429, detail))
+            return
         lost = session.counts.lost
         dropped = session.offer(first, samples, time.monotonic())
         self.metrics.missed(session.counts.lost - lost, dropped)
         self._feed(session)
+
+    def window(self, session: Session, count: int) -> tuple[int, FloatArray] | None:
+        """Return first index and samples that a session's observer can be made of, or None."""
+        dropped = session.counts.dropped
+        found = session.window(count)
+        self.metrics.missed(0, session.counts.dropped - dropped)
+        return found
 
     def begin(self, session: Session, plan: bytes, origin: int, ready: Mapping[str, Any]) -> None:
         """Start the observer of a session at a waiting sample."""
@@ -184,11 +197,6 @@ class Hub:
                 if time.monotonic() - session.touched > self.limits.idle and not session.finishing:
                     self.close(session, End(1008, 408, f"no new sample for {self.limits.idle:g} s"))
                     continue
-                if session.frames > MOST_FRAMES:
-                    detail = f"{session.frames} frames in one second, at most {MOST_FRAMES} are accepted: send more samples per frame"
-                    self.close(session, End(1008, 429, detail))
-                    continue
-                session.frames = 0
                 self.tell_status(session)
 
     def tell_status(self, session: Session, event: str = "status") -> None:
