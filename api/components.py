@@ -18,16 +18,18 @@ from api.settings import Settings
 from api.stores.entities import Store
 from api.streams.hub import Hub
 from api.work.answers import Answers
+from api.work.kernels import Kernels
 from api.work.pool import Work
 
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Settings, store, workers and their answers, files and uploads, rate limits (also of wrong keys), metrics, streams, event feeds,
-    examples, supervisor."""
+    """Settings, store, kernels, workers and their answers, files and uploads, rate limits (also of wrong keys), metrics, streams, event
+    feeds, examples, supervisor."""
 
     settings: Settings
     store: Store
+    kernels: Kernels
     work: Work
     answers: Answers
     files: Files

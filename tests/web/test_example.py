@@ -75,6 +75,10 @@ def test_from_an_empty_page_to_a_best_speed(opened, client: Client, served: Serv
     assert 15_000 < float(page.locator(".best").get_attribute("data-rpm") or 0.0) < 19_000
     assert clicks <= 4
 
+    # what it takes is what it took here
+    page.goto(f"{served.url}/#/campaigns/{example}")
+    expect(page.get_by_text(re.compile(r"usable cuts; the last one took \d+ s$"))).to_be_visible()
+
     # what is dropped meanwhile is no part of it
     machine = next(m for m in client.machines() if m.example)
     page.goto(f"{served.url}/#/machines/{machine.id}/recordings")
