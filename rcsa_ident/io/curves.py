@@ -253,8 +253,9 @@ def _write(
     """Write columns of one length; a number that is not finite is an empty cell, unless the column is in `finite`."""
     where = str(path)
     for name, values in further.items():
-        if name in columns or not name.strip() or any(sign in name for sign in ',;\t\n\r"#'):
-            raise InputError("column", name, "a name of its own without , ; tab, quotes or #", where)
+        # spreadsheets take a cell that begins with = + - or @ for a formula
+        if name in columns or not name.strip() or any(sign in name for sign in ',;\t\n\r"#') or name.strip()[0] in "=+-@":
+            raise InputError("column", name, "a name of its own without , ; tab, quotes or #, that does not begin with = + - or @", where)
         columns = columns | {name: np.asarray(values, dtype=float)}
     shapes = {name: values.shape for name, values in columns.items()}
     first = next(iter(shapes.values()))

@@ -189,7 +189,7 @@ def keyed(tmp_path):
             ("upload", "local", ("upload",)),
             ("other", "B", ("admin",)),
         ):
-            key, keys[name] = make_key(group, scopes, name)
+            key, keys[name] = make_key(group, scopes, name, days=7.0 if name == "read" else None)
             parts.store.keys.add(key)
         object.__setattr__(parts, "settings", parts.settings.model_copy(update={"keys": True}))
         yield http, id, keys
@@ -227,7 +227,7 @@ def test_keys_scopes_and_groups(keyed):
         until(socket, "opened")
 
 
-def test_a_key_that_is_withdrawn_ends_its_stream(keyed, monkeypatch):
+def test_a_key_that_expires_or_is_withdrawn_ends_its_stream(keyed, monkeypatch):
     monkeypatch.setattr("api.live.stream_connection.LOOK", 0.1)
     http, id, keys = keyed
     with http.websocket_connect(STREAM) as socket, http.websocket_connect(STREAM) as viewer:
@@ -236,7 +236,7 @@ def test_a_key_that_is_withdrawn_ends_its_stream(keyed, monkeypatch):
         viewer.send_json({"watch": session, "key": keys["read"]})
         until(viewer, "watching")
         store = http.app.state.components.store
-        store.keys.delete("local", keys["read"].split("_")[1])
+        monkeypatch.setattr("api.security.now", lambda: store.keys.get(keys["read"].split("_")[1]).expires)
         assert closed(viewer)[1]["status"] == 401
         assert session in http.app.state.components.streams.sessions
         store.keys.delete("local", keys["run"].split("_")[1])
