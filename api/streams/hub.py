@@ -26,6 +26,9 @@ log = logging.getLogger("rcsa_ident.service")
 #: Most frames of a session per second, each of which costs as much as hundreds of samples, and the seconds that may come at once: behind
 #: a pause of the network, or of this process, frames come that were sent in time.
 MOST_FRAMES, PAUSED = 2000, 5
+#: Blocks of all sessions under computation at once: enough for the process to have work. Beyond that sessions take turns, and what is
+#: on its way to the process stays small, however many they are: a buffer is moved as a whole when it grows.
+MOST_FLYING = 16
 _UNEXPECTED = "an internal error occurred; it is logged under this session's id"
 
 
@@ -74,6 +77,9 @@ class Hub:
         self.sessions: dict[str, Session] = {}
         self.numbers = itertools.count(1)
         self.by_number: dict[int, Session] = {}
+        #: Sessions that may have samples for the process, in the order of their turns.
+        self.turns: dict[Session, None] = {}
+        self.flying = 0
         self.ticking: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -122,10 +128,12 @@ class Hub:
         """End a session and remove it."""
         session.finish(end)
         if self.sessions.pop(session.about.id, None) is not None:
+            self.flying -= len(session.flying)
             self.places.give(session.about.group)
             self.by_number.pop(session.number, None)
             self.host.post(Message(CLOSE, session.number))
             self.metrics.missed(0, session.held)
+            self._send_blocks()
 
     def offer(self, session: Session, first: int, samples: FloatArray) -> None:
         """Take a frame from a session's client; too many of them end the session."""
@@ -158,9 +166,21 @@ class Hub:
         self._feed(session)
 
     def _feed(self, session: Session) -> None:
-        while session.stage is Stage.LIVE and (block := session.block()) is not None:
-            first, samples, arrived = block
-            self.host.post(Message(BLOCK, session.number, first, arrived, content=samples.astype("<f8").tobytes()))
+        """Let a session take its turn."""
+        self.turns.setdefault(session)
+        self._send_blocks()
+
+    def _send_blocks(self) -> None:
+        """Send blocks to the process, one of each session in turn."""
+        while self.turns and self.flying < MOST_FLYING:
+            session = next(iter(self.turns))
+            del self.turns[session]
+            if session.stage is Stage.LIVE and (block := session.block()) is not None:
+                first, samples, arrived = block
+                self.flying += 1
+                self.host.post(Message(BLOCK, session.number, first, arrived, content=samples.astype("<f8").tobytes()))
+                if session.waiting.runs:
+                    self.turns[session] = None
 
     def _deliver(self, message: Message) -> None:
         session = self.by_number.get(message.session)
@@ -176,18 +196,21 @@ class Hub:
         elif message.kind == FORCES:
             values = np.frombuffer(message.content, "<f8").reshape(-1, len(session.about.axes))
             delay = time.monotonic() - message.arrived
+            self.flying -= 1
             session.drift, session.known = message.drift, message.known > 0.0
             self.metrics.streamed(session.forces(message.first, values, delay), delay)
             self._feed(session)
 
     def _anew(self) -> None:
-        for session in list(self.sessions.values()):
-            if session.stage is Stage.LIVE:
-                self.metrics.missed(0, session.lost_process())
-                self.host.post(Message(OPEN, session.number, content=session.plan))
-                for listener in session.listeners:
-                    listener.tell("restarted", detail="the observer starts again")
-                self._feed(session)
+        self.flying, live = 0, [session for session in self.sessions.values() if session.stage is Stage.LIVE]
+        for session in live:
+            self.metrics.missed(0, session.lost_process())
+            self.host.post(Message(OPEN, session.number, content=session.plan))
+            for listener in session.listeners:
+                listener.tell("restarted", detail="the observer starts again")
+        # only once the process knows all of them: a turn may be another one's
+        for session in live:
+            self._feed(session)
 
     async def _tick(self) -> None:
         """Send the status each second; end sessions without samples."""

@@ -14,10 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from api.metrics import Metrics
+from api.streams import engine
 from api.streams.counts import Counts
+from api.streams.engine import Message
 from api.streams.envelope import Envelope
 from api.streams.frames import MOST_INDEX, MOST_SAMPLES, TooLarge, packed, samples_of, samples_of_text, unpacked
-from api.streams.hub import PAUSED, Hub, StreamLimits
+from api.streams.hub import MOST_FLYING, PAUSED, Hub, StreamLimits
 from api.streams.listener import WAITING_BYTES, WAITING_TEXTS, Listener
 from api.streams.session import BLOCK, FLYING, About, End, Session, Stage
 from rcsa_ident.errors import InputError
@@ -256,6 +258,35 @@ def test_frames_are_counted_per_second_and_not_per_tick(monkeypatch):
         assert session.stage is Stage.SETTLING
         hub.offer(session, 2000, np.zeros((1, 2)))
         assert (session.end.code, session.end.status) == (1008, 429)
+
+    asyncio.run(run())
+
+
+def test_sessions_take_turns_and_little_is_on_its_way_however_many_they_are():
+    class Sent(list):
+        def post(self, message):
+            self.extend([message.session] if message.kind == engine.BLOCK else [])
+
+    async def run():
+        sent = Sent()
+        hub = Hub(sent, StreamLimits(sessions=40, sessions_per_group=40), Metrics(lambda: 0.0))
+        sessions = [hub.open(replace(ABOUT, id=str(k))) for k in range(30)]
+        for session in sessions:
+            session.stage = Stage.LIVE
+        for k in range(2):
+            for session in sessions:
+                hub.offer(session, BLOCK * k, np.zeros((BLOCK, 2)))
+        assert len(sent) == MOST_FLYING
+        # room comes with the end of a session and with forces: whoever waits longest is next
+        hub.close(sessions[1], End())
+        assert len(sent) == MOST_FLYING + 1
+        for k in range(40):
+            hub._deliver(Message(engine.FORCES, sent[k], content=np.zeros((BLOCK, 2)).tobytes()))
+            assert hub.flying <= MOST_FLYING
+        assert sorted(sent[:30]) == [session.number for session in sessions]
+        # a process that begins anew knows nothing of what was sent before
+        hub._anew()
+        assert 0 < hub.flying == sum(len(session.flying) for session in hub.sessions.values())
 
     asyncio.run(run())
 
