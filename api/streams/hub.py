@@ -26,7 +26,7 @@ log = logging.getLogger("rcsa_ident.service")
 #: Most frames of a session per second, each of which costs as much as hundreds of samples, and the seconds that may come at once: behind
 #: a pause of the network, or of this process, frames come that were sent in time.
 MOST_FRAMES, PAUSED = 2000, 5
-#: Blocks of all sessions under computation at once: enough for the process to have work. Beyond that sessions take turns, and what is
+#: Blocks of all sessions under computation, from which on sessions wait: enough for the process to have work. They take turns, and what is
 #: on its way to the process stays small, however many they are: a buffer is moved as a whole when it grows.
 MOST_FLYING = 16
 _UNEXPECTED = "an internal error occurred; it is logged under this session's id"
@@ -171,16 +171,14 @@ class Hub:
         self._send_blocks()
 
     def _send_blocks(self) -> None:
-        """Send blocks to the process, one of each session in turn."""
+        """Send blocks to the process, of each session in turn as many as may fly: behind dropped samples an observer settles."""
         while self.turns and self.flying < MOST_FLYING:
             session = next(iter(self.turns))
             del self.turns[session]
-            if session.stage is Stage.LIVE and (block := session.block()) is not None:
+            while session.stage is Stage.LIVE and (block := session.block()) is not None:
                 first, samples, arrived = block
                 self.flying += 1
                 self.host.post(Message(BLOCK, session.number, first, arrived, content=samples.astype("<f8").tobytes()))
-                if session.waiting.runs:
-                    self.turns[session] = None
 
     def _deliver(self, message: Message) -> None:
         session = self.by_number.get(message.session)
