@@ -457,6 +457,6 @@ def test_the_service_is_ready_when_the_streams_are(tmp_path):
         near.ready = False
         answer = http.get("/ready")
         assert answer.status_code == 503
-        assert answer.json()["detail"].endswith("streams is starting: 0 of 4 steps of compilation are done")
+        assert answer.json()["detail"].endswith("streams is starting, 0 of 4 steps of compilation are done")
         (tmp_path / "kernels" / "lobes.done").touch()
         assert "1 of 4 steps" in http.get("/ready").json()["detail"]

@@ -100,7 +100,7 @@ export const getBlob = async (path) => (await send("GET", path)).blob();
 /** How far a service is that has just been started, in words. */
 export async function howFar() {
   const answer = await fetched(new URL("ready", document.baseURI).href, { method: "GET", headers: {} });
-  return answer.ok ? "The virtual machine gets ready …" : `Wait: ${(await answer.json()).detail}.`;
+  return answer.ok ? "The virtual machine gets ready …" : `Wait: ${problemOf(answer.status, await answer.text()).message} …`;
 }
 
 let description = null;

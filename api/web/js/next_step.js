@@ -15,7 +15,14 @@ export function tryButton(fault, kind = "primary") {
   button.addEventListener(
     "click",
     busy(button, async () => {
-      const still = setInterval(async () => fill(fault, waiting(await howFar())), 1000);
+      const looks = setInterval(
+        () =>
+          howFar().then(
+            (words) => button.disabled && fill(fault, waiting(words)),
+            () => {}, // the request that is waited for says what is wrong
+          ),
+        1000,
+      );
       try {
         fill(fault, waiting("The virtual machine gets ready …"));
         const made = await makeExample();
@@ -25,7 +32,7 @@ export function tryButton(fault, kind = "primary") {
       } catch (error) {
         failed(fault, error);
       } finally {
-        clearInterval(still);
+        clearInterval(looks);
       }
     }),
   );
