@@ -4,16 +4,15 @@
 FROM python:3.13-slim AS build
 
 WORKDIR /opt/source
+# the same versions as in CI, by their hashes; they are installed anew only where they change
+COPY .ci/image.txt ./.ci/image.txt
+RUN python -m venv /opt/rcsa-ident && /opt/rcsa-ident/bin/pip install --no-cache-dir --require-hashes -r .ci/image.txt
 COPY pyproject.toml README.md LICENSE ./
-COPY .ci/constraints.txt ./.ci/constraints.txt
 COPY rcsa_ident ./rcsa_ident
 COPY api ./api
 COPY data/machines ./data/machines
 COPY data/robots ./data/robots
-# the same versions as in CI, those that build the package included
-RUN python -m venv /opt/rcsa-ident \
-    && PIP_CONSTRAINT=.ci/constraints.txt PIP_BUILD_CONSTRAINT=.ci/constraints.txt \
-    /opt/rcsa-ident/bin/pip install --no-cache-dir ".[tdms,parquet]"
+RUN /opt/rcsa-ident/bin/pip install --no-cache-dir --no-deps --no-build-isolation --no-index .
 
 
 FROM python:3.13-slim AS installed

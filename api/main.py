@@ -12,13 +12,14 @@ from fastapi.openapi.utils import get_openapi
 
 from api import data_folder, problems
 from api.access import AccessMonitor
-from api.components import Components, Rates
+from api.components import Components
 from api.files import Files
 from api.head_requests import HeadRequests
 from api.jobs import leases
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
 from api.metrics import JobCounts, Metrics
+from api.rates import Rates
 from api.reading.example_campaign import Examples
 from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads
@@ -67,6 +68,7 @@ from api.stores.sql import open_store
 from api.streams.hub import Hub, StreamLimits
 from api.streams.process import Host, StreamProcess
 from api.work.answers import Answers
+from api.work.kernels import Kernels
 from api.work.pool import Pool, Work
 from api.work.worker import QueryLimits
 from rcsa_ident.version import __version__
@@ -100,7 +102,8 @@ def create_app(
     kept = open_store(settings.database_url, settings.group_database_bytes) if store is None else store
     most = QueryLimits(settings.query_seconds, settings.query_memory)
     several = settings.asks_for_keys
-    workers = Pool(settings.workers, settings.queue, settings.kept_machines, most, several) if work is None else work
+    kernels = Kernels(settings.data / "kernels")
+    workers = Pool(settings.workers, settings.queue, settings.kept_machines, most, several, kernels) if work is None else work
     files = Files(settings.data / "files", settings.group_bytes, settings.free_bytes)
     limits = Limits(settings.reader_memory, settings.reader_seconds, settings.reader_wall_seconds, settings.reader_calls)
     readers = (
@@ -109,16 +112,17 @@ def create_app(
     uploads = Uploads(kept, files, readers, Shares(settings.uploads, several))
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
     feeds = EventFeeds(kept.jobs, Shares(settings.watchers, several))
-    hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
+    hub = Hub(StreamProcess(kernels) if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
     made, wrong = Examples(uploads, workers), Rates(*WRONG_KEYS)
     components = Components(
-        settings, kept, workers, Answers(workers), files, readers, uploads, rates, wrong, metrics, hub, feeds, made, supervisor
+        settings, kept, kernels, workers, Answers(workers), files, readers, uploads, rates, wrong, metrics, hub, feeds, made, supervisor
     )
     metrics.registry.register(JobCounts(kept.jobs))
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        kernels.begin()
         workers.start()
         readers.start()
         await hub.start()

@@ -212,15 +212,15 @@ def ask(port: int, method: str, path: str, body: Any, connection: HTTPConnection
 
 
 @contextmanager
-def serving(folder: Path) -> Iterator[tuple[int, int]]:
-    """Run the service on a free port of loopback until it is ready, and end it; yields the port and its process."""
+def serving(folder: Path, **further: str) -> Iterator[tuple[int, int]]:
+    """Run the service on a free port of loopback, with further settings, until it is ready, and end it; yields the port and its process."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = int(free.getsockname()[1])
     settings = {"RCSA_IDENT_DATA": str(folder), "RCSA_IDENT_PORT": str(port), "RCSA_IDENT_WORKERS": "2"}
     limits = {"RCSA_IDENT_REQUESTS_PER_MINUTE": "1000000", "RCSA_IDENT_BURST": "1000000"}
     words = [sys.executable, "-c", "from api.serve import main; main()"]
-    with subprocess.Popen(words, env={**os.environ, **settings, **limits}, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(words, env={**os.environ, **settings, **limits, **further}, stderr=subprocess.DEVNULL) as process:
         try:
             for _ in range(600):
                 try:

@@ -23,6 +23,7 @@ from api.client import Client
 from api.stream_client import Event, Forces, ForceStream
 from benchmarks.observer import DATA
 from benchmarks.service import serving
+from benchmarks.stream_crowd import crowd
 from benchmarks.timing import row
 from tests.fixtures.service import processes
 from tests.fixtures.turning_cut import TurningCut, turning_cut
@@ -41,7 +42,7 @@ def run(seconds: float = 60.0, beside: bool = True) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, service):
         url = f"http://127.0.0.1:{port}"
         with Client(url) as client:
-            machine = prepared(client)
+            machine = prepared(client, result_text())
             jobs = begun(client, machine) if beside else []
             before = taken()
             found = paced(port, service, machine, turning, frames)
@@ -55,10 +56,10 @@ def run(seconds: float = 60.0, beside: bool = True) -> list[dict[str, Any]]:
     return told(found, frames.shape[0], true, turning.rate, state)
 
 
-def prepared(client: Client) -> str:
+def prepared(client: Client, result: str) -> str:
     """Write machine and tooling, and return the machine's id."""
     machine = client.make_machine("HPM sample machine").id
-    client.identify(machine, result_text())
+    client.identify(machine, result)
     text = (DATA / "machines" / "toolings" / "S2-PG25.toml").read_text(encoding="utf-8")
     client.write_tooling("T1", text.replace("teeth = 4", "teeth = 2"))
     return machine
@@ -199,7 +200,7 @@ def hour(seconds: float) -> None:
     answered, end = [0], dict[str, Any]()
     with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, service):
         with Client(f"http://127.0.0.1:{port}") as client:
-            machine = prepared(client)
+            machine = prepared(client, result_text())
         print(f"before: {memory(service)}", flush=True)
         with ForceStream(f"ws://127.0.0.1:{port}", hello(machine, turning.rate)) as stream:
             moved = threading.Condition()
@@ -250,9 +251,15 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--alone", action="store_true", help="without an identification beside it")
     parser.add_argument("--long", type=float, metavar="SECONDS", help="so many seconds of stream as fast as it goes, with memory")
+    parser.add_argument("--crowd", type=int, metavar="STREAMS", help="so many streams at once, and what others wait for meanwhile")
+    parser.add_argument("--frames", type=float, default=50.0, help="of a stream of the crowd per second")
+    parser.add_argument("--samples", type=int, default=FRAME, help="of a frame of the crowd")
+    parser.add_argument("--lonely", action="store_true", help="the crowd leaves every second frame out")
     given = parser.parse_args(arguments)
     if given.long is not None:
         hour(given.long)
         return
-    for each in run(given.seconds, not given.alone):
-        print(f"{each['claim']:<64} {each['ours']:<10.4g} {each['unit']:<8} {each['accuracy']}")
+    crowded = given.crowd is not None
+    for each in crowd(given.crowd, given.frames, given.samples, given.lonely) if crowded else run(given.seconds, not given.alone):
+        peer = "" if each["peer"] is None else f"(without {each['peer']:.4g})"
+        print(f"{each['claim']:<72} {each['ours']:<8.4g} {each['unit']:<8} {peer} {each['accuracy']}", flush=True)

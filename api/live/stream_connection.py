@@ -36,6 +36,8 @@ PAUSE = 0.5
 LOOK = 3.0
 #: A larger jump of the sample index is an error of the sender, not a gap [s].
 MOST_AHEAD = 3600.0
+#: Frames that are taken without a look at others' requests: a millisecond.
+TOGETHER = 16
 UNEXPECTED = End(1011, 500, "an internal error occurred; it is logged under this session's id")
 _WORDS = {1009: 413, 1003: 415}
 
@@ -144,7 +146,7 @@ async def _send(websocket: WebSocket, session: Session, listener: Listener) -> N
 
 async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text: bool, feeds: bool) -> None:
     """Receive frames until the client ends the stream."""
-    channels = session.about.channels
+    channels, taken = session.about.channels, 0
     while True:
         message = await websocket.receive()
         if message["type"] == "websocket.disconnect":
@@ -161,6 +163,10 @@ async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text
         if session.counts.following >= 0 and ahead > MOST_AHEAD * session.about.rate:
             raise InputError("first", first, f"an index at most an hour ahead of the last one, {session.counts.following}")
         hub.offer(session, first, samples)
+        # frames that have come together are taken in parts, others' requests between them
+        taken += 1
+        if taken % TOGETHER == 0:
+            await asyncio.sleep(0.0)
     await finish(hub, session)
 
 
@@ -181,7 +187,7 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
     hub, loop = components.streams, asyncio.get_running_loop()
     limit, refused = loop.time() + SETTLING, None
     while session.stage is not Stage.LIVE:
-        window = (0, None) if opening.source is not None else session.window(opening.settle)
+        window = (0, None) if opening.source is not None else hub.window(session, opening.settle)
         if session.stage is Stage.ENDED:
             return
         if window is None and session.finishing:
@@ -190,7 +196,12 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
             return
         if window is None:
             session.arrived.clear()
-            await session.arrived.wait()
+            try:
+                async with asyncio.timeout_at(limit):
+                    await session.arrived.wait()
+            except TimeoutError:
+                found = f"no {opening.settle} samples without a gap within {SETTLING:g} s"
+                raise refused or InputError("samples", found, "samples without gaps, until the observer is made") from None
             continue
         session.stage = Stage.DESIGNING
         try:

@@ -31,9 +31,9 @@ async def health() -> State:
 def ready(components: ThisService) -> State:
     components.store.check()
     if not components.work.ready:
-        raise Problem(503, "the worker processes are starting", headers={"Retry-After": "2"})
+        raise Problem(503, f"the worker processes are starting, {components.kernels.progress}", headers={"Retry-After": "2"})
     if not components.streams.host.ready:
-        raise Problem(503, "the process of the force streams is starting", headers={"Retry-After": "2"})
+        raise Problem(503, f"the process of the force streams is starting, {components.kernels.progress}", headers={"Retry-After": "2"})
     if components.supervisor is not None and not components.supervisor.ready:
         raise Problem(503, "no job worker is running: accepted jobs wait", headers={"Retry-After": "5"})
     return State(status="ok")

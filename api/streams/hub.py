@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from api.metrics import Metrics
+from api.rates import Rates
 from api.shares import Shares
 from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, REFUSED, Message
 from api.streams.listener import Listener
@@ -22,8 +23,12 @@ from api.streams.session import About, End, Session, Stage
 from rcsa_ident.arrays import FloatArray
 
 log = logging.getLogger("rcsa_ident.service")
-#: Most frames of a session per second: each costs as much as hundreds of samples.
-MOST_FRAMES = 2000
+#: Most frames of a session per second, each of which costs as much as hundreds of samples, and the seconds that may come at once: behind
+#: a pause of the network, or of this process, frames come that were sent in time.
+MOST_FRAMES, PAUSED = 2000, 5
+#: Blocks of all sessions under computation, from which on sessions wait: enough for the process to have work. They take turns, and what is
+#: on its way to the process stays small, however many they are: a buffer is moved as a whole when it grows.
+MOST_FLYING = 16
 _UNEXPECTED = "an internal error occurred; it is logged under this session's id"
 
 
@@ -68,9 +73,13 @@ class Hub:
     def __init__(self, host: Host, limits: StreamLimits, metrics: Metrics) -> None:
         self.host, self.limits, self.metrics = host, limits, metrics
         self.places = Shares(limits.sessions, limits.several)
+        self.pace = Rates(60 * MOST_FRAMES, PAUSED * MOST_FRAMES)
         self.sessions: dict[str, Session] = {}
         self.numbers = itertools.count(1)
         self.by_number: dict[int, Session] = {}
+        #: Sessions that may have samples for the process, in the order of their turns.
+        self.turns: dict[Session, None] = {}
+        self.flying = 0
         self.ticking: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -119,18 +128,30 @@ class Hub:
         """End a session and remove it."""
         session.finish(end)
         if self.sessions.pop(session.about.id, None) is not None:
+            self.flying -= len(session.flying)
             self.places.give(session.about.group)
             self.by_number.pop(session.number, None)
             self.host.post(Message(CLOSE, session.number))
             self.metrics.missed(0, session.held)
+            self._send_blocks()
 
     def offer(self, session: Session, first: int, samples: FloatArray) -> None:
-        """Take a frame from a session's client."""
-        session.frames += 1
+        """Take a frame from a session's client; too many of them end the session."""
+        if self.pace.wait(session.about.id):
+            detail = f"more than {MOST_FRAMES} frames per second: send more samples per frame"
+            self.close(session, End(1008, 429, detail))
+            return
         lost = session.counts.lost
         dropped = session.offer(first, samples, time.monotonic())
         self.metrics.missed(session.counts.lost - lost, dropped)
         self._feed(session)
+
+    def window(self, session: Session, count: int) -> tuple[int, FloatArray] | None:
+        """Return first index and samples that a session's observer can be made of, or None."""
+        dropped = session.counts.dropped
+        found = session.window(count)
+        self.metrics.missed(0, session.counts.dropped - dropped)
+        return found
 
     def begin(self, session: Session, plan: str, origin: int, ready: Mapping[str, Any]) -> None:
         """Start the observer of a session at a waiting sample."""
@@ -145,9 +166,19 @@ class Hub:
         self._feed(session)
 
     def _feed(self, session: Session) -> None:
-        while session.stage is Stage.LIVE and (block := session.block()) is not None:
-            first, samples, arrived = block
-            self.host.post(Message(BLOCK, session.number, first, arrived, content=samples.astype("<f8").tobytes()))
+        """Let a session take its turn."""
+        self.turns.setdefault(session)
+        self._send_blocks()
+
+    def _send_blocks(self) -> None:
+        """Send blocks to the process, of each session in turn as many as may fly: behind dropped samples an observer settles."""
+        while self.turns and self.flying < MOST_FLYING:
+            session = next(iter(self.turns))
+            del self.turns[session]
+            while session.stage is Stage.LIVE and (block := session.block()) is not None:
+                first, samples, arrived = block
+                self.flying += 1
+                self.host.post(Message(BLOCK, session.number, first, arrived, content=samples.astype("<f8").tobytes()))
 
     def _deliver(self, message: Message) -> None:
         session = self.by_number.get(message.session)
@@ -163,18 +194,21 @@ class Hub:
         elif message.kind == FORCES:
             values = np.frombuffer(message.content, "<f8").reshape(-1, len(session.about.axes))
             delay = time.monotonic() - message.arrived
+            self.flying -= 1
             session.drift, session.known = message.drift, message.known > 0.0
             self.metrics.streamed(session.forces(message.first, values, delay), delay)
             self._feed(session)
 
     def _anew(self) -> None:
-        for session in list(self.sessions.values()):
-            if session.stage is Stage.LIVE:
-                self.metrics.missed(0, session.lost_process())
-                self.host.post(Message(OPEN, session.number, content=session.plan))
-                for listener in session.listeners:
-                    listener.tell("restarted", detail="the observer starts again")
-                self._feed(session)
+        self.flying, live = 0, [session for session in self.sessions.values() if session.stage is Stage.LIVE]
+        for session in live:
+            self.metrics.missed(0, session.lost_process())
+            self.host.post(Message(OPEN, session.number, content=session.plan))
+            for listener in session.listeners:
+                listener.tell("restarted", detail="the observer starts again")
+        # only once the process knows all of them: a turn may be another one's
+        for session in live:
+            self._feed(session)
 
     async def _tick(self) -> None:
         """Send the status each second; end sessions without samples."""
@@ -184,11 +218,6 @@ class Hub:
                 if time.monotonic() - session.touched > self.limits.idle and not session.finishing:
                     self.close(session, End(1008, 408, f"no new sample for {self.limits.idle:g} s"))
                     continue
-                if session.frames > MOST_FRAMES:
-                    detail = f"{session.frames} frames in one second, at most {MOST_FRAMES} are accepted: send more samples per frame"
-                    self.close(session, End(1008, 429, detail))
-                    continue
-                session.frames = 0
                 self.tell_status(session)
 
     def tell_status(self, session: Session, event: str = "status") -> None:

@@ -12,6 +12,8 @@ from typing import Protocol
 from api.log_lines import telling
 from api.processes import BackOff, Child
 from api.streams.engine import HEADER, READY, Engine, Message
+from api.work.kernels import Kernels
+from api.work.pool import prepare_observers
 
 log = logging.getLogger("rcsa_ident.service")
 #: Restarts in succession without a pause, and time for the process to end by itself [s].
@@ -36,9 +38,15 @@ class Host(Protocol):
 
 
 class StreamProcess:
-    """A spawned process behind a socket pair, restarted when it dies."""
+    """A spawned process behind a socket pair, restarted when it dies.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    kernels : Kernels
+    """
+
+    def __init__(self, kernels: Kernels = Kernels()) -> None:  # noqa: B008 - never changed
+        self.kernels = kernels
         self.process: Child | None = None
         self.writer: asyncio.StreamWriter | None = None
         self.task: asyncio.Task[None] | None = None
@@ -50,7 +58,7 @@ class StreamProcess:
 
     async def _spawned(self) -> asyncio.StreamReader:
         ours, theirs = socket.socketpair()
-        self.process = await asyncio.to_thread(Child, serve, theirs, name="rcsa-ident-streams")
+        self.process = await asyncio.to_thread(Child, serve, theirs, self.kernels, name="rcsa-ident-streams")
         theirs.close()
         reader, self.writer = await asyncio.open_connection(sock=ours)
         return reader
@@ -100,15 +108,12 @@ async def _received(reader: asyncio.StreamReader) -> Message:
     return Message(kind, session, first, arrived, drift, known, await reader.readexactly(length))
 
 
-def serve(connection: socket.socket) -> None:
+def serve(connection: socket.socket, kernels: Kernels) -> None:
     """Answer messages until the service closes its end."""
     with contextlib.suppress(OSError), open("/proc/self/comm", "w", encoding="utf-8") as name:
         # its name in `ps` and `top`
         name.write("rcsa-streams")
-    from rcsa_ident.workflows.compile_kernels import STEPS
-
-    STEPS["force observer"]()
-    import rcsa_ident.workflows.stream_forces  # noqa: F401
+    prepare_observers(kernels)
 
     engine, source = Engine(), connection.makefile("rb", buffering=1 << 16)
     with contextlib.suppress(OSError):

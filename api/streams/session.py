@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from api.log_lines import ids
+from api.streams.backlog import Backlog
 from api.streams.counts import Counts
 from api.streams.listener import Listener
 from rcsa_ident.arrays import FloatArray
@@ -113,7 +114,7 @@ class Session:
         #: What its lines in the log carry: those of the request that opened it, too.
         self.ids = ids() | {"session": about.id, "stream": str(number)}
         self.stage, self.end = Stage.SETTLING, End()
-        self.counts, self.waiting = Counts(), deque[tuple[int, FloatArray, float]]()
+        self.counts, self.waiting = Counts(), Backlog()
         self.flying: deque[int] = deque()
         self.listeners: list[Listener] = []
         self.ready: dict[str, Any] = {}
@@ -123,7 +124,7 @@ class Session:
         self.second = Second.of(len(about.axes))
         self.room, self.over, self.drained, self.arrived = (asyncio.Event() for _ in range(4))
         self.room.set()
-        self.finishing, self.frames, self.settling = False, 0, 0
+        self.finishing, self.settling = False, 0
 
     @property
     def held(self) -> int:
@@ -137,58 +138,45 @@ class Session:
             return 0
         self.touched = now
         self.arrived.set()
-        self.waiting.append((first + late, samples[late:], now))
+        self.waiting.add(first + late, samples[late:], now)
         dropped = 0
-        while self.held > self.about.most_waiting and len(self.waiting) > 1:
-            dropped += self.waiting[0][1].shape[0]
-            self.counts.drop(self.waiting.popleft()[1].shape[0])
+        while (excess := self.held - self.about.most_waiting) > 0:
+            dropped += self._drop(excess)
         if self.held > self.about.most_waiting // 2:
             self.room.clear()
         return dropped
 
     def window(self, count: int) -> tuple[int, FloatArray] | None:
-        """Return first index and samples of the earliest `count` ones that wait without a gap, or None."""
-        begin, parts, have = 0, list[FloatArray](), 0
-        for first, samples, _ in self.waiting:
-            if not parts or first != begin + have:
-                begin, parts, have = first, [], 0
-            parts.append(samples)
-            have += samples.shape[0]
-            if have >= count:
-                return begin, np.concatenate(parts)[:count]
-        return None
+        """Return first index and samples of the earliest `count` ones that wait without a gap, or None; fewer before a gap are dropped."""
+        runs = self.waiting.runs
+        while runs and runs[0][1] < count:
+            if len(runs) == 1:
+                return None
+            # behind the gap nothing is added to them
+            self._drop(runs[0][1])
+        return (runs[0][0], self.waiting.head(count)) if runs else None
 
     def skip(self, index: int) -> int:
         """Drop waiting samples before an index, and return their number."""
-        dropped = 0
-        while self.waiting and self.waiting[0][0] < index:
-            first, samples, arrived = self.waiting.popleft()
-            keep = samples[max(index - first, 0) :]
-            dropped += samples.shape[0] - keep.shape[0]
-            if keep.shape[0]:
-                self.waiting.appendleft((index, keep, arrived))
-                break
+        dropped, runs = 0, self.waiting.runs
+        while runs and runs[0][0] < index:
+            dropped += self._drop(index - runs[0][0])
+        return dropped
+
+    def _drop(self, count: int) -> int:
+        dropped = self.waiting.drop(count)
         self.counts.drop(dropped)
         return dropped
 
     def block(self) -> tuple[int, FloatArray, float] | None:
         """Return the next block without gaps, or None where nothing waits or enough blocks are under computation."""
-        if not self.waiting or len(self.flying) >= FLYING:
+        if not self.waiting.runs or len(self.flying) >= FLYING:
             return None
-        first, samples, arrived = self.waiting.popleft()
-        parts, have = [samples], samples.shape[0]
-        while self.waiting and have < BLOCK and self.waiting[0][0] == first + have:
-            _, more, _ = self.waiting.popleft()
-            parts.append(more)
-            have += more.shape[0]
-        whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        if have > BLOCK:
-            self.waiting.appendleft((first + BLOCK, whole[BLOCK:], arrived))
-            whole = whole[:BLOCK]
-        self.flying.append(whole.shape[0])
+        first, samples, arrived = self.waiting.take(BLOCK)
+        self.flying.append(samples.shape[0])
         if self.held <= self.about.most_waiting // 2:
             self.room.set()
-        return first, whole, arrived
+        return first, samples, arrived
 
     def forces(self, first: int, values: FloatArray, delay: float) -> int:
         """Take the forces of the oldest block under computation, and return its samples: in those without a force the observer settles."""

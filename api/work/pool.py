@@ -10,6 +10,7 @@ from queue import LifoQueue
 from typing import Any, Protocol, TypeVar
 
 from api.shares import GROUP, FairThreads, Shares
+from api.work.kernels import ANSWERS, OBSERVERS, Kernels
 from api.work.worker import Killed, QueryLimits, Worker
 
 T = TypeVar("T")
@@ -58,6 +59,7 @@ class Pool:
         Of each call.
     several : bool
         Whether the queue is shared by groups.
+    kernels : Kernels
     """
 
     def __init__(
@@ -67,8 +69,9 @@ class Pool:
         machines: int,
         limits: QueryLimits = QueryLimits(),  # noqa: B008 - frozen
         several: bool = False,
+        kernels: Kernels = Kernels(),  # noqa: B008 - never changed
     ) -> None:
-        self.workers, self.machines, self.limits = workers, machines, limits
+        self.workers, self.machines, self.limits, self.kernels = workers, machines, limits, kernels
         self.places = Shares(workers + queue, several)
         self.members: list[Worker] = []
         # the one that was used last comes first: its machines are read already
@@ -93,7 +96,7 @@ class Pool:
             self.threads.submit(self._answer, _Call())
 
     def _worker(self) -> Worker:
-        return Worker(self.limits, partial(_begin, self.machines), warm_observer)
+        return Worker(self.limits, partial(_begin, self.machines, self.kernels), partial(prepare_observers, self.kernels))
 
     async def run(self, call: Callable[..., T], *arguments: Any) -> T:
         """Return the answer of a call; where the caller is cancelled, the call ends with its process.
@@ -193,12 +196,12 @@ class _Call:
                 self.member.process.kill()
 
 
-def _begin(machines: int) -> None:
-    """In a new worker: import the tasks and compile what quick answers need."""
+def _begin(machines: int, kernels: Kernels) -> None:
+    """In a new worker: import the tasks and prepare what quick answers need."""
     from api.work import tasks
 
     tasks.keep(machines)
-    warm()
+    kernels.prepare(*ANSWERS)
 
 
 def guarded(call: Callable[..., T], *arguments: Any) -> T:
@@ -218,17 +221,7 @@ def guarded(call: Callable[..., T], *arguments: Any) -> T:
         raise
 
 
-def warm() -> None:
-    """Compile the kernels of quick answers, or load them from the cache."""
-    from rcsa_ident.workflows.compile_kernels import STEPS
-
-    for step in ("tool-holder", "lobes", "robot"):
-        STEPS[step]()
-
-
-def warm_observer() -> None:
-    """Compile the kernels of the design of force observers, which a stream waits for."""
-    from rcsa_ident.workflows.compile_kernels import STEPS
-
-    STEPS["force observer"]()
+def prepare_observers(kernels: Kernels) -> None:
+    """Prepare the design of force observers, which a stream waits for."""
+    kernels.prepare(*OBSERVERS)
     import rcsa_ident.workflows.stream_forces  # noqa: F401

@@ -8,8 +8,8 @@ import itertools
 import pytest
 
 from api.client import Client
-from api.components import MOST_BUCKETS, Rates
 from api.live.jobs import events
+from api.rates import MOST_BUCKETS, Rates
 from api.schemas.robots import EXAMPLE as ROBOT
 from api.security import SCOPES, Caller
 from tests.api.identifying import job

@@ -8,16 +8,20 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from api.work.kernels import Kernels
 from api.work.pool import Busy, Pool, guarded
 from api.work.requests import TooLong
 from api.work.worker import Failed, QueryLimits, Worker
 from rcsa_ident.errors import InputError
+from rcsa_ident.workflows import compile_kernels
 from tests.fixtures.waiting import ended, until
 
 
@@ -242,6 +246,30 @@ def test_previews_of_one_query_are_shared_by_the_processes():
 def test_a_pool_that_has_not_begun_refuses():
     with pytest.raises(Busy):
         asyncio.run(Pool(1, 1, 1).run(pow, 2, 2))
+
+
+def test_kernels_are_compiled_by_one_process_while_the_others_wait(tmp_path, monkeypatch):
+    both, together = threading.Barrier(2), []
+
+    def step():
+        # whoever is alone waits in vain
+        with suppress(threading.BrokenBarrierError):
+            both.wait(0.1)
+            together.append(True)
+
+    monkeypatch.setattr(compile_kernels, "STEPS", {"lobes": step})
+    kernels = Kernels(tmp_path / "kernels")
+    kernels.begin()
+    threads = [threading.Thread(target=kernels.prepare, args=("lobes",)) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not together
+    assert kernels.progress == "1 of 4 steps of compilation are done"
+    # at the next start the cache may be another one
+    kernels.begin()
+    assert kernels.progress.startswith("0 of 4")
 
 
 def divide():

@@ -5,15 +5,21 @@ from __future__ import annotations
 import asyncio
 import json
 import struct
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from api.metrics import Metrics
+from api.streams import engine
 from api.streams.counts import Counts
+from api.streams.engine import Message
 from api.streams.envelope import Envelope
 from api.streams.frames import MOST_INDEX, MOST_SAMPLES, TooLarge, packed, samples_of, samples_of_text, unpacked
+from api.streams.hub import MOST_FLYING, PAUSED, Hub, StreamLimits
 from api.streams.listener import WAITING_BYTES, WAITING_TEXTS, Listener
 from api.streams.session import BLOCK, FLYING, About, End, Session, Stage
 from rcsa_ident.errors import InputError
@@ -143,7 +149,7 @@ def test_a_session_drops_the_oldest_and_never_holds_more_than_it_may():
             session.offer(1000 * k, np.full((1000, 2), float(k)), 0.0)
             assert session.held <= ABOUT.most_waiting
         assert session.counts.dropped == 20_000
-        assert session.waiting[0][0] == 20_000
+        assert session.waiting.runs[0] == (20_000, 10_000)
         assert not session.room.is_set()
         assert [session.block()[0] for _ in range(2)] == [20_000, 20_000 + BLOCK]
         # half of what may wait is gone
@@ -184,14 +190,103 @@ def test_the_window_is_the_first_one_without_a_gap():
     async def run():
         session = Session(ABOUT, 1)
         session.offer(0, np.zeros((50, 2)), 0.0)
+        assert session.window(100) is None
         session.offer(60, np.ones((70, 2)), 0.0)
         assert session.window(100) is None
+        # no observer will be made of what lies before the gap
+        assert (session.counts.dropped, session.held) == (50, 70)
         session.offer(130, np.ones((40, 2)), 0.0)
         first, samples = session.window(100)
         assert (first, samples.shape) == (60, (100, 2))
         assert np.all(samples == 1.0)
-        assert session.skip(70) == 60
-        assert (session.waiting[0][0], session.counts.dropped) == (70, 60)
+        assert session.skip(70) == 10
+        assert (session.waiting.runs[0], session.counts.dropped) == ((70, 100), 60)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("step", [1, 2], ids=["without a gap", "every second one lost"])
+def test_a_frame_costs_the_same_however_many_wait(step):
+    """Lines of code that run, with the search for a window at each frame: twice the frames, twice the lines."""
+
+    def lines(frames):
+        ran = 0
+
+        def follow(*_):
+            nonlocal ran
+            ran += 1
+            return follow
+
+        async def run():
+            session = Session(replace(ABOUT, most_waiting=10**6), 1)
+            sys.settrace(follow)
+            for k in range(frames):
+                session.offer(step * k, np.zeros((1, 2)), 0.0)
+                session.window(10_000)
+            while session.block():
+                session.flying.clear()
+            sys.settrace(None)
+
+        before = sys.gettrace()
+        asyncio.run(run())
+        sys.settrace(before)
+        return ran
+
+    assert lines(400) < 2.1 * lines(200)
+
+
+def test_frames_are_counted_per_second_and_not_per_tick(monkeypatch):
+    """A tick that comes late has seen the frames of more than a second; too many end a stream, however early they come."""
+
+    class Nowhere:
+        def post(self, message):
+            pass
+
+    monkeypatch.setattr("api.streams.hub.MOST_FRAMES", 20)
+
+    async def run():
+        hub, now = Hub(Nowhere(), StreamLimits(), Metrics(lambda: 0.0)), 0.0
+        monkeypatch.setattr(hub.pace, "clock", lambda: now)
+        session = hub.open(ABOUT)
+        for k in range(200):
+            now += 0.05
+            hub.offer(session, k, np.zeros((1, 2)))
+        # as many as were held up together, and then one more
+        now += 1.0
+        for k in range(20 * PAUSED):
+            hub.offer(session, 1000 + k, np.zeros((1, 2)))
+        assert session.stage is Stage.SETTLING
+        hub.offer(session, 2000, np.zeros((1, 2)))
+        assert (session.end.code, session.end.status) == (1008, 429)
+
+    asyncio.run(run())
+
+
+def test_sessions_take_turns_and_little_is_on_its_way_however_many_they_are():
+    class Sent(list):
+        def post(self, message):
+            self.extend([message.session] if message.kind == engine.BLOCK else [])
+
+    async def run():
+        sent = Sent()
+        hub = Hub(sent, StreamLimits(sessions=40, sessions_per_group=40), Metrics(lambda: 0.0))
+        sessions = [hub.open(replace(ABOUT, id=str(k))) for k in range(30)]
+        for session in sessions:
+            session.stage = Stage.LIVE
+        for k in range(2):
+            for session in sessions:
+                hub.offer(session, BLOCK * k, np.zeros((BLOCK, 2)))
+        assert len(sent) == MOST_FLYING
+        # room comes with the end of a session and with forces: whoever waits longest is next
+        hub.close(sessions[1], End())
+        assert sent[MOST_FLYING:] == [MOST_FLYING + 1] * 2
+        for k in range(40):
+            hub._deliver(Message(engine.FORCES, sent[k], content=np.zeros((BLOCK, 2)).tobytes()))
+            assert hub.flying < MOST_FLYING + FLYING
+        assert list(dict.fromkeys(sent)) == [session.number for session in sessions]
+        # a process that begins anew knows nothing of what was sent before
+        hub._anew()
+        assert 0 < hub.flying == sum(len(session.flying) for session in hub.sessions.values())
 
     asyncio.run(run())
 

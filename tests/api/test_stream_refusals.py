@@ -189,7 +189,7 @@ def keyed(tmp_path):
             ("upload", "local", ("upload",)),
             ("other", "B", ("admin",)),
         ):
-            key, keys[name] = make_key(group, scopes, name)
+            key, keys[name] = make_key(group, scopes, name, days=7.0 if name == "read" else None)
             parts.store.keys.add(key)
         object.__setattr__(parts, "settings", parts.settings.model_copy(update={"keys": True}))
         yield http, id, keys

@@ -300,15 +300,18 @@ def test_who_sends_nothing_is_ended(tmp_path):
     assert "1 s" in problem["detail"]
 
 
-def test_too_many_small_frames_end_a_stream(shop, monkeypatch):
+def test_an_observer_that_cannot_be_made_has_an_end_in_time(shop, monkeypatch):
+    """Of lonely samples none is ever made, however many come."""
     http, id = shop
-    monkeypatch.setattr("api.streams.hub.MOST_FRAMES", 20)
+    monkeypatch.setattr("api.live.stream_connection.SETTLING", 0.1)
     with http.websocket_connect(STREAM) as socket:
         socket.send_json(hello(id))
+        until(socket, "opened")
         for k in range(50):
-            send(socket, k, np.zeros((1, 4)))
+            send(socket, 2 * k, np.zeros((1, 4)))
         code, problem = closed(socket)
-    assert (code, problem["status"]) == (1008, 429)
+    assert (code, problem["status"], problem["errors"][0]["field"]) == (1008, 422, "samples")
+    assert f"no {SETTLE} samples without a gap within 0.1 s" in problem["detail"]
 
 
 @pytest.mark.slow
@@ -454,4 +457,6 @@ def test_the_service_is_ready_when_the_streams_are(tmp_path):
         near.ready = False
         answer = http.get("/ready")
         assert answer.status_code == 503
-        assert "streams" in answer.json()["detail"]
+        assert answer.json()["detail"].endswith("streams is starting, 0 of 4 steps of compilation are done")
+        (tmp_path / "kernels" / "lobes.done").touch()
+        assert "1 of 4 steps" in http.get("/ready").json()["detail"]

@@ -45,6 +45,17 @@ def test_the_lock_keeps_every_requirement_within_its_bounds():
     assert left == [], "run .ci/lock"
 
 
+def test_the_image_installs_those_versions_by_their_hashes():
+    lines = (ROOT / ".ci" / "image.txt").read_text(encoding="utf-8").replace(" \\\n   ", "").splitlines()[1:]
+    pins = [line.partition(" --hash=sha256:")[0] for line in lines]
+    assert all(re.fullmatch(r".+?( --hash=sha256:[0-9a-f]{64})+", line) for line in lines)
+    assert set(pins) <= set(LOCK), "run .ci/lock"
+    wanted = map(
+        Requirement, [*PROJECT["build-system"]["requires"], *PROJECT["project"]["dependencies"], *EXTRAS["tdms"], *EXTRAS["parquet"]]
+    )
+    assert {canonicalize_name(each.name) for each in wanted} <= {pin.partition("==")[0] for pin in pins}
+
+
 def installed() -> list[Distribution]:
     """Return everything that the package and its extras bring to this machine."""
     waiting = [("rcsa-ident", extra) for extra in ("", *EXTRAS)]

@@ -55,6 +55,7 @@ def test_frf_of_one_axis(tmp_path):
         (([1.0], {"X": [1.0]}, {"a,b": [1.0]}), "column: found a,b"),
         *((([1.0], {"X": [1.0]}, {f" {sign}1+1": [1.0]}), f"column: found  {re.escape(sign)}1.*allowed is a name") for sign in "=+-@"),
         (([1.0], {"X": [1.0]}, {"b": [np.inf]}), "column b: found inf"),
+        *((([1.0], {"X": [1.0]}, {f" {sign}A1": [1.0]}), f"column: found  {re.escape(sign)}A1") for sign in "=+-@"),
     ],
 )
 def test_frf_that_is_not_written(tmp_path, arguments, words):

@@ -96,6 +96,9 @@ class Watch:
             self.faults.append(f"another host: {request.url}")
 
     def _answered(self, answer: Response) -> None:
+        if answer.url.endswith("/ready"):
+            # with 503 it says how far a service is that has just been started
+            return
         api = "/v1/" in answer.url
         if answer.status >= 500 or (answer.status >= 400 and not api):
             self.faults.append(f"{answer.status} {answer.url}")

@@ -6,7 +6,7 @@ import re
 from itertools import pairwise
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from api.client import Client
 from tests.fixtures import by_hand
@@ -33,7 +33,15 @@ def test_from_an_empty_page_to_a_best_speed(opened, client: Client, served: Serv
         clicks += 1
         page.get_by_role(what, name=name).first.click(timeout=120_000)
 
+    # a service that has just been started says how far it is
+    starting = {"detail": "the worker processes are starting, 2 of 4 steps of compilation are done"}
+    page.route("**/ready", lambda route: route.fulfill(status=503, json=starting))
+    held: list[Route] = []
+    page.route("**/v1/examples/campaign", lambda route: held.append(route))
     click("button", "Try it with an example")
+    expect(page.get_by_text("2 of 4 steps of compilation are done")).to_be_visible()
+    held[0].continue_()
+    page.unroute_all()
     expect(page.locator("h1")).to_have_text("Example: HPM sample machine", timeout=60_000)
     identify = page.get_by_role("button", name="Identify the machine")
     expect(identify).to_have_class("primary", timeout=120_000)
@@ -74,6 +82,10 @@ def test_from_an_empty_page_to_a_best_speed(opened, client: Client, served: Serv
     expect(best).to_be_visible(timeout=120_000)
     assert 15_000 < float(page.locator(".best").get_attribute("data-rpm") or 0.0) < 19_000
     assert clicks <= 4
+
+    # what it takes is what it took here
+    page.goto(f"{served.url}/#/campaigns/{example}")
+    expect(page.get_by_text(re.compile(r"usable cuts; the last one took \d+ s$"))).to_be_visible()
 
     # what is dropped meanwhile is no part of it
     machine = next(m for m in client.machines() if m.example)

@@ -29,8 +29,11 @@ def plain(text: str) -> str:
 
 
 def test_a_tool_card_prints_on_one_page(opened, shop: str):
-    page = opened(f"#/change?machine={shop}&tooling=T1&im=20")
-    page.get_by_role("link", name="Print tool card").click(timeout=60_000)
+    page, asked = opened(), list[str | None]()
+    page.on("request", lambda request: asked.append(request.post_data) if request.url.endswith("/v1/advice") else None)
+    page.goto(f"{page.url.partition('#')[0]}#/change?machine={shop}&tooling=T1&im=20")
+    expect(page.locator(".best .figure output")).to_be_visible(timeout=60_000)
+    page.get_by_role("link", name="Print tool card").click()
     expect(page.locator("h1")).to_have_text("Tool card: T1")
     card = page.locator(".tool-card")
     expect(card).to_contain_text("Recommended cuts", timeout=60_000)
@@ -38,6 +41,9 @@ def test_a_tool_card_prints_on_one_page(opened, shop: str):
     for words in ("Shop", "20 %", "down milling", "rcsa-ident", "version 1", "identification"):
         assert words in said
     assert card.locator("tbody tr").count() >= 1
+    # to the letter what the view before has asked: the service has the answer
+    assert len(asked) == 2
+    assert asked[0] == asked[1]
     expect(card.locator("img.drawing")).to_be_visible()
     assert page.pdf(format="A4").count(b"/Type /Page\n") == 1
 

@@ -97,6 +97,12 @@ export const post = async (path, json, options = {}) => (await send("POST", path
 export const getText = async (path, accept, options = {}) => (await send("GET", path, { headers: { Accept: accept }, ...options })).text();
 export const getBlob = async (path) => (await send("GET", path)).blob();
 
+/** How far a service is that has just been started, in words. */
+export async function howFar() {
+  const answer = await fetched(new URL("ready", document.baseURI).href, { method: "GET", headers: {} });
+  return answer.ok ? "The virtual machine gets ready …" : `Wait: ${problemOf(answer.status, await answer.text()).message} …`;
+}
+
 let description = null;
 
 /** The description of the interface, asked for once. */

@@ -1,5 +1,5 @@
 // What comes next for a machine, said wherever there is nothing to show yet; without any machine, that is an example.
-import { all, send } from "./api.js";
+import { all, howFar, send } from "./api.js";
 import { card, empty, fill, h, link, waiting } from "./dom.js";
 import { busy, failed } from "./forms.js";
 import { go, to } from "./router.js";
@@ -15,6 +15,14 @@ export function tryButton(fault, kind = "primary") {
   button.addEventListener(
     "click",
     busy(button, async () => {
+      const looks = setInterval(
+        () =>
+          howFar().then(
+            (words) => button.disabled && fill(fault, waiting(words)),
+            () => {}, // the request that is waited for says what is wrong
+          ),
+        1000,
+      );
       try {
         fill(fault, waiting("The virtual machine gets ready …"));
         const made = await makeExample();
@@ -23,6 +31,8 @@ export function tryButton(fault, kind = "primary") {
         go(`campaigns/${made.campaign}`);
       } catch (error) {
         failed(fault, error);
+      } finally {
+        clearInterval(looks);
       }
     }),
   );
@@ -37,7 +47,7 @@ export function exampleCard(fault) {
     h(
       "p",
       null,
-      "A virtual machine makes 24 cuts in some ten seconds. Identify it from them, change the tool, and read the best speed. All of it is marked as an example, and goes with one click.",
+      "A virtual machine makes 24 cuts. Identify it from them, change the tool, and read the best speed. All of it is marked as an example, and goes with one click.",
     ),
     h("div", { class: "row-of-buttons" }, tryButton(fault)),
   );
@@ -91,6 +101,15 @@ export async function nextStep(machine, words) {
   );
 }
 
+let begun = null;
+
+/** Seconds that the rest of an example takes at the pace that this page has seen, or null. */
+function rest(id, there, all) {
+  const now = performance.now() / 1000;
+  if (begun?.id !== id) begun = { id, there, now };
+  return there > begun.there ? Math.ceil(((now - begun.now) / (there - begun.there)) * (all - there)) : null;
+}
+
 /** How far the virtual machine is with an example campaign; it goes on where it was stopped. */
 export function filling(campaign) {
   const files = campaign.cuts.flatMap((cut) => [cut.cut, cut.air]).filter(Boolean);
@@ -98,10 +117,11 @@ export function filling(campaign) {
   const box = h("div", { class: "view" });
   const judged = campaign.cuts.filter((cut) => cut.verdict).length;
   if (there === files.length && judged === campaign.cuts.length) return { box, done: true };
+  const seconds = rest(campaign.id, there, files.length);
   fill(
     box,
     h("progress", { max: String(files.length), value: String(there), "aria-label": "Recordings of the example" }),
-    h("p", { class: "soft small" }, `The virtual machine is cutting: ${there} of ${files.length} recordings are there. Identify it as soon as they all are.`),
+    h("p", { class: "soft small" }, `The virtual machine is cutting: ${there} of ${files.length} recordings are there. ${seconds === null ? "" : `The rest takes about ${seconds} s at this pace. `}Identify it as soon as they all are.`),
   );
   return { box, done: false };
 }

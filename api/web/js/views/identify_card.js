@@ -1,5 +1,5 @@
 // From a campaign to its identification.
-import { once, post, Problem } from "../api.js";
+import { get, once, post, Problem } from "../api.js";
 import { card, h } from "../dom.js";
 import { busy, failed, field, quantity, select } from "../forms.js";
 import { go } from "../router.js";
@@ -9,6 +9,12 @@ function source({ usable, cuts, hammer_tests }) {
   const tested = hammer_tests.filter((test) => test.file.uploaded).length;
   const parts = [...(cuts.length ? [`${usable} usable cuts`] : []), ...(tested ? [`${tested} hammer tests`] : [])];
   return parts.join(" and ");
+}
+
+/** What the last identification that was completed took on this service, in words. */
+async function lasted() {
+  const job = (await get("identifications?limit=20")).items.find((each) => each.state === "done" && each.started);
+  return job ? `; the last one took ${Math.ceil((new Date(job.finished) - new Date(job.started)) / 1000)} s` : "";
 }
 
 /** The next step, and what may be set for it. */
@@ -25,6 +31,11 @@ export function identifyCard(campaign) {
   const start = h("input", { type: "checkbox", id: "start" });
   // until there are enough, more recordings are the next step
   const button = h("button", { class: campaign.too_few ? null : "primary" }, "Identify the machine");
+  const time = h("span");
+  lasted().then(
+    (words) => time.append(words),
+    () => {}, // what it takes is no reason to say what is wrong
+  );
   const form = h(
     "form",
     { novalidate: true, class: "view" },
@@ -32,7 +43,7 @@ export function identifyCard(campaign) {
       "div",
       { class: "row-of-buttons" },
       button,
-      h("span", { class: "soft" }, `from ${source(campaign)}; it takes about half a minute`),
+      h("span", { class: "soft" }, `from ${source(campaign)}`, time),
     ),
     campaign.too_few ? h("p", { class: "soft" }, campaign.too_few) : null,
     h(
