@@ -25,7 +25,7 @@ class Kernels:
     def begin(self) -> None:
         """Forget what was done before this start: the cache may have gone since."""
         if self.folder is not None:
-            self.folder.mkdir(exist_ok=True)
+            self.folder.mkdir(parents=True, exist_ok=True)
             for mark in self.folder.glob("*.done"):
                 mark.unlink()
 
