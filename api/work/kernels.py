@@ -29,12 +29,17 @@ class Kernels:
             for mark in self.folder.glob("*.done"):
                 mark.unlink()
 
-    def prepare(self, *names: str) -> None:
-        """In a child: compile steps, or load them from the cache where another one has compiled them."""
+    def prepare(self, *names: str, locks: bool = True) -> None:
+        """In a child: compile steps, or load them from the cache where another one has compiled them.
+
+        A process that may lock nothing loads what is compiled; the rest it compiles where it is needed.
+        """
         from rcsa_ident.workflows.compile_kernels import STEPS
 
         for name in names:
             if self.folder is not None and not (mark := self.folder / f"{name}.done").exists():
+                if not locks:
+                    continue
                 # the system lets go of it however the process ends
                 with filelock.FileLock(self.folder / f"{name}.lock"):
                     if not mark.exists():

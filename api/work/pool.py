@@ -96,7 +96,7 @@ class Pool:
             self.threads.submit(self._answer, _Call())
 
     def _worker(self) -> Worker:
-        return Worker(self.limits, partial(_begin, self.machines, self.kernels), partial(prepare_observers, self.kernels))
+        return Worker(self.limits, partial(_begin, self.machines, self.kernels), partial(prepare_observers, self.kernels, locks=False))
 
     async def run(self, call: Callable[..., T], *arguments: Any) -> T:
         """Return the answer of a call; where the caller is cancelled, the call ends with its process.
@@ -221,7 +221,7 @@ def guarded(call: Callable[..., T], *arguments: Any) -> T:
         raise
 
 
-def prepare_observers(kernels: Kernels) -> None:
+def prepare_observers(kernels: Kernels, locks: bool = True) -> None:
     """Prepare the design of force observers, which a stream waits for."""
-    kernels.prepare(*OBSERVERS)
+    kernels.prepare(*OBSERVERS, locks=locks)
     import rcsa_ident.workflows.stream_forces  # noqa: F401

@@ -75,8 +75,10 @@ def test_the_whole_answer_is_the_services(opened, client: Client, shop: str):
     cut = {"immersion": 0.5, "strategy": "down", "feed_direction": "+X", "feed_per_tooth_mm": 0.1}
     speeds = {"from_rpm": 8000, "to_rpm": 9000, "step_rpm": 250}
     (wanted,) = client.lobes(shop, "T1", cut=cut, speeds=speeds, method="full-discretisation").toolings
-    drawn = page.evaluate("document.querySelector('.chart.lobes .plot').data.find((t) => t.name === 'T1').y")
-    assert list(drawn) == pytest.approx([10.0 if depth is None else depth for depth in wanted.limit_depth_mm], rel=1e-12)
+    # the service may know the recommended cut from a test before: it comes in front of the limits then
+    expected = pytest.approx([10.0 if depth is None else depth for depth in wanted.limit_depth_mm], rel=1e-12)
+    drawn = "document.querySelector('.chart.lobes .plot').data.find((t) => t.name === 'T1').y"
+    until(lambda: page.wait_for_timeout(100) or list(page.evaluate(drawn)) == expected)
     expect(best).to_have_attribute("data-rpm", f"{wanted.recommended[0].spindle_speed_rpm:.10g}")
     expect(page.locator(".standing")).to_be_hidden()
     assert page.evaluate(POINTS) == []
