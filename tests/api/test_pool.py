@@ -272,6 +272,20 @@ def test_kernels_are_compiled_by_one_process_while_the_others_wait(tmp_path, mon
     assert kernels.progress.startswith("0 of 4")
 
 
+def test_who_may_lock_nothing_loads_what_another_has_compiled(tmp_path, monkeypatch):
+    done = []
+    monkeypatch.setattr(compile_kernels, "STEPS", {"lobes": lambda: done.append("lobes")})
+    kernels = Kernels(tmp_path / "kernels")
+    kernels.begin()
+    kernels.prepare("lobes", locks=False)
+    assert not done
+    kernels.prepare("lobes")
+    kernels.prepare("lobes", locks=False)
+    assert len(done) == 2
+    Kernels().prepare("lobes", locks=False)
+    assert len(done) == 3
+
+
 def divide():
     return 1 / 0
 
