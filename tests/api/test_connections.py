@@ -305,5 +305,6 @@ def test_an_answer_that_was_read_is_not_given_up_later():
 
     with listening(large(1), Kept) as port, socket.create_connection(("127.0.0.1", port)) as link:
         link.sendall(GET + b"Connection: close\r\n\r\n")
+        until(lambda: made and made[0].unread)
         assert sum(iter(lambda: len(link.recv(1_000_000)), 0)) > 20_000_000
     assert made[0].unread.cancelled()
