@@ -80,7 +80,7 @@ def test_a_restored_service_answers_as_the_other_did(data, tmp_path):
     # two databases, two uploads and what was read from each
     assert account.files == 6
     assert oct((tmp_path / "b.tar").stat().st_mode & 0o777) == "0o600"
-    assert sorted(path.name for path in data.iterdir()) == ["backup.lock", "files", "jobs.db", "service.db"]
+    assert sorted(path.name for path in data.iterdir()) == ["backup.lock", "files", "jobs.db", "kernels", "service.db"]
     new = tmp_path / "deep" / "new"
     assert restore(tmp_path / "b.tar", new) == account
     assert answers(new, tmp_path / "scratch") == expected
@@ -196,7 +196,7 @@ save.backup(Path(sys.argv[1]), Path(sys.argv[2]))
     assert not (tmp_path / "new").exists()
     # what the dead one has left in the data folder is gone with the next
     backup(data, target)
-    assert sorted(path.name for path in data.iterdir()) == ["backup.lock", "files", "jobs.db", "service.db"]
+    assert sorted(path.name for path in data.iterdir()) == ["backup.lock", "files", "jobs.db", "kernels", "service.db"]
     restore(target, tmp_path / "new")
 
 
