@@ -253,8 +253,8 @@ TIP_STIFFNESS = Range(
         ("were modal masses given in g ({})?", 1e-3),
     ),
 )
-#: Of any mode of a tip: one that seems stiffer hardly moves, and limits without it are too high.
-MODE_STIFFNESS = replace(TIP_STIFFNESS, usual=(1e5, 2e10))
+#: Of any mode of a tip: one that seems stiffer hardly moves, and limits without it are too high; one that is rigid stands for no motion.
+MODE_STIFFNESS = replace(TIP_STIFFNESS, usual=(1e5, 2e10), possible=(1e3, 1e18))
 TIP_DAMPING = Range("", 1.0, (0.001, 0.5), (1e-6, 1.0), (("was it given in percent ({})?", 1e-2),))
 RATE = Range("Hz", 1.0, (200.0, 5e6), (0.1, 1e8), (("was it given in kHz ({})?", 1e3),))
 SENSOR_MASS = Range("g", 1e-3, (0.0, 100.0), (0.0, 1000.0), (("was it given in g ({})?", 1e-3),))
