@@ -23,12 +23,13 @@ from typing import Any, BinaryIO
 
 from api import log_lines
 
-#: All that a process is told of the service's environment: language, places of programs and kernels, threads of libraries. No password is.
+#: All that a process is told of the service's environment: language, places of programs, and what libraries that compute are told, which
+#: changes last bits: a question has one answer in all processes. No password is.
 _VARIABLES = (
     "PATH", "LD_LIBRARY_PATH", "LD_PRELOAD", "HOME", "USERPROFILE", "LOCALAPPDATA", "SYSTEMROOT", "TMPDIR", "TEMP", "TMP", "XDG_CACHE_HOME",
     "LANG", "LC_ALL", "LC_CTYPE", "TZ", "PYTHONHOME", "PYTHONDONTWRITEBYTECODE", "PYTHONUTF8",
-    "NUMBA_CACHE_DIR", "NUMBA_THREADING_LAYER", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES",
 )  # fmt: skip
+_LIBRARIES = ("OMP_", "OPENBLAS_", "MKL_", "NUMBA_", "NPY_")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 #: Of `prctl`.
 _SIGNAL_AT_PARENTS_END = 1
@@ -239,7 +240,7 @@ class Line:
 
 
 def _environment() -> dict[str, str]:
-    known = {name: os.environ[name] for name in _VARIABLES if name in os.environ}
+    known = {name: value for name, value in os.environ.items() if name in _VARIABLES or name.startswith(_LIBRARIES)}
     known |= {name: os.environ.get(name, "1") for name in _THREADS}
     # its files are its own: nothing locks them, and nothing else may be locked
     known["HDF5_USE_FILE_LOCKING"] = "FALSE"

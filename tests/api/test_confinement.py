@@ -13,7 +13,7 @@ import textwrap
 
 import pytest
 
-from api import confinement
+from api import confined, confinement
 from api.confinement import Confinement
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux" or platform.machine() not in ("x86_64", "aarch64"), reason="the kernel's own means")
@@ -171,3 +171,9 @@ def test_compiled_kernels_that_lie_elsewhere_can_be_read(tmp_path, monkeypatch):
     assert tmp_path not in confinement._python()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert tmp_path in confinement._python()
+
+
+def test_it_computes_as_the_processes_of_jobs_do(monkeypatch):
+    """What libraries are told of the processor changes last bits, and with them a limit by 5e-9."""
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "HASWELL")
+    assert confined._environment()["OPENBLAS_CORETYPE"] == "HASWELL"
