@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from rcsa_ident.coupling import _kernels as kernels
 
@@ -39,7 +38,6 @@ def test_tips_over_many_things():
     np.testing.assert_allclose(found, [by_solving(tip, flange, to, back, w) for w in behind], rtol=1e-10)
 
 
-@pytest.mark.slow
 def test_changes_along_steps_at_some_of_the_frequencies():
     rng = np.random.default_rng(3)
     tip, flange, to, back, carried = parts(rng)

@@ -13,7 +13,6 @@ from rcsa_ident.identification.genetic_algorithm import modal_fractions
 from tests.identification.substructures import candidate, lumped, substructure
 
 
-@pytest.mark.slow
 def test_modal_cross_frf_is_that_of_coupled_modes():
     rng = np.random.default_rng(6)
     omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 17)

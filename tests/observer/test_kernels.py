@@ -60,7 +60,6 @@ def test_kalman_steps(system):
     np.testing.assert_array_equal(np.vstack(parts), result)
 
 
-@pytest.mark.slow
 def test_smoothed_force(system):
     """The backward recursion with full matrices."""
     arrays, gain, row, variance, dense, measured = system

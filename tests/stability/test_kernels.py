@@ -44,7 +44,6 @@ def test_eigenvalues(characteristic):
         assert np.min(np.abs(np.linalg.eigvals(ALPHA @ model(middle)) / found - 1.0)) < 1e-6
 
 
-@pytest.mark.slow
 def test_largest_real_part(characteristic):
     fine = np.linspace(OMEGA[0], OMEGA[-1], 20001)
     expected = max(np.linalg.eigvals(ALPHA @ model(w)).real.max() for w in fine)
@@ -53,7 +52,6 @@ def test_largest_real_part(characteristic):
     assert np.linalg.eigvals(ALPHA @ model(place)).real.max() == pytest.approx(expected, rel=1e-5)
 
 
-@pytest.mark.slow
 def test_envelopes(characteristic):
     speeds = np.array([900.0, 1333.0, 2000.0])
     equal = np.full(3, 2.0 * np.pi / 3.0)
@@ -133,7 +131,6 @@ def test_no_limit_where_no_eigenvalue_has_a_positive_real_part():
     assert lobe[0] == -1
 
 
-@pytest.mark.slow
 def test_receptance_at_any_frequency():
     values = np.array([model(w).ravel() for w in OMEGA])
     inside = np.array([OMEGA[0], OMEGA[1] + 1.0, OMEGA[80] + 11.0, OMEGA[-2] + 3.0, OMEGA[-1]])
@@ -187,7 +184,6 @@ def test_where_one_direction_is_rigid_its_eigenvalue_is_zero():
     assert np.all(np.isnan(end))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("before", [1, 2])
 def test_a_limit_in_the_first_interval_of_a_band_is_found(characteristic, before):
     """A band that begins right below the chatter frequency gives the limit that the whole band gives."""
@@ -226,7 +222,6 @@ def lowest_limit(omega, eigenvalues, stiffness, pitch, speed):
     return min(found)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("equal", [True, False])
 def test_limits_of_drawn_eigenvalues(equal):
     """Few and wide intervals: the first and the last count, and either eigenvalue has its turn."""

@@ -27,7 +27,6 @@ def test_solve():
         np.testing.assert_allclose(right, expected, rtol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_largest_of_hessenberg(seed):
     rng = np.random.default_rng(seed)
@@ -54,7 +53,6 @@ def test_largest_where_nothing_is_left_of_a_pivot():
     np.testing.assert_allclose(matrix @ vector, value * vector, rtol=0, atol=1e-7 * np.abs(matrix).max())
 
 
-@pytest.mark.slow
 def test_largest_of_a_rotation():
     """Eigenvalues of one magnitude all round the circle."""
     matrix = np.zeros((6, 6))

@@ -133,7 +133,6 @@ def test_walls_are_taken_down_to_all_that_an_edge_has_passed(room: int) -> None:
     assert np.array_equal(walls[1], wanted[1])
 
 
-@pytest.mark.slow
 def test_a_march_is_that_of_the_full_equations() -> None:
     """Two freedoms, one with play, and a mode: every instant's equations by brute force, with the force of `cut_force` in both."""
     step, count, radius = 2e-5, 120, 0.005

@@ -56,7 +56,6 @@ def test_a_border_goes_around_with_the_material_on_its_left() -> None:
     assert kernels.contour(layer_of(field, 0.002), np.array([-1, 99, -1, 99]), np.empty((3, 4))) == len(pieces)
 
 
-@pytest.mark.slow
 def test_columns_have_the_material_on_both_sides_of_a_line() -> None:
     field = block_with_hole()
     line = 0.008
