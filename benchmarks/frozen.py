@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from benchmarks.machines import turned_sample
@@ -35,7 +36,6 @@ from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.robots import robot_keys
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.samples import simulate_campaign
-from tests.fixtures import by_hand
 from tests.fixtures.hit import write_hit
 from tests.fixtures.rung_tooling import rung_tooling
 from tests.identification.posed.robots import sheet
@@ -44,55 +44,56 @@ from tests.identification.posed.robots import write_campaign as robot_campaign
 ROOT = Path(__file__).resolve().parent.parent
 #: What commands read; it is not compared.
 _INPUTS = "in"
-_POSTURE = '"-11.71 20.78 110 82.76 60.80 -166.96"'
+_TOOL = "in/data/machines/toolings/S3-PG25-long.toml"
 _PROCESS = "--ktc-mpa 660 --krc 0.38"
-_POCKET = '{e}/TOOLING.toml {t}/programs/pocket.nc --stock "-5 -5 -8 65 45 0"'
-#: One a line; {d}, {e}, {t} and {i} are the project's data, the examples, the fixtures and the simulated campaigns.
-COMMANDS = [
-    line.format(d=f"{_INPUTS}/data", e=f"{_INPUTS}/examples", t=f"{_INPUTS}/fixtures", i=_INPUTS)
-    for line in f"""
-check {{d}}/sample_runs --json
-identify {{d}}/sample_runs --seed 1 --out sample-1.json --json
-identify {{d}}/sample_runs --seed 2 --out sample-2.json
-identify {{d}}/sample_runs --seed 3 --out sample-3.json
-identify {{i}}/coupled --out coupled.json --json
-identify {{i}}/rough-501/campaign --out rough.json --json
-identify {{i}}/passes --out passes.json --json
-identify {{i}}/hit --out hit.json --json
-robot identify {{i}}/ROBOT.toml {{i}}/campaign --out robot.json --json
-tooltip sample-1.json {{d}}/machines/toolings/S3-PG25-long.toml --out TIP.csv --json
-tooltip coupled.json {{d}}/machines/toolings/S3-PG25-long.toml --out TIP-coupled.csv --json
-robot tip robot.json {{d}}/machines/toolings/S3-PG25-long.toml --posture {_POSTURE} --out TIP-robot.csv --json
-robot check {{d}}/robots/tx200.toml --posture {_POSTURE} --json
-robot lobes {{d}}/robots/tx200.toml {{d}}/machines/toolings/S3-PG25-long.toml --posture {_POSTURE} {_PROCESS} --out LOBES-robot.csv --json
-robot plan {{d}}/robots/tx200.toml --tests payload --count 1 --box "500 -1000 300 1600 1000 1800" --out POSTURES.csv --json
-advise sample-1.json {{d}}/machines/toolings/S3-PG25-long.toml --feed-per-tooth-mm 0.1 --depth-mm 1 --card CARD.html --json
-advise coupled.json {{d}}/machines/toolings/S3-PG25-long.toml --feed-per-tooth-mm 0.1 --json
-forces sample-1.json {{d}}/sample_runs/toolings/S2-PG25.toml {{d}}/sample_runs/recordings/S2-PG25-10_cut.h5 \
- --air {{d}}/sample_runs/recordings/S2-PG25-10_air.h5 --speed-rpm 11077 --out FORCES.csv --json
-plan sample-1.json --toolings {{d}}/machines/toolings/S1-ER32.toml --target {{d}}/machines/toolings/S3-PG25-long.toml --out PLAN.toml --json
-export sample-1.json --to uff --tooling {{d}}/machines/toolings/S3-PG25-long.toml --out TIP.uff --json
+#: Words that commands share.
+_WORDS = {
+    "tool": _TOOL,
+    "posture": '"-11.71 20.78 110 82.76 60.80 -166.96"',
+    "process": _PROCESS,
+    "pocket": 'in/examples/TOOLING.toml in/fixtures/programs/pocket.nc --stock "-5 -5 -8 65 45 0"',
+}
+#: One a line; inputs stand in the folder `in`, and some commands read what earlier ones have written.
+_COMMANDS = """
+check in/data/sample_runs --json
+identify in/data/sample_runs --seed 1 --out sample-1.json --json
+identify in/data/sample_runs --seed 2 --out sample-2.json
+identify in/data/sample_runs --seed 3 --out sample-3.json
+identify in/coupled --out coupled.json --json
+identify in/rough-501/campaign --out rough.json --json
+identify in/passes --out passes.json --json
+identify in/hit --out hit.json --json
+robot identify in/ROBOT.toml in/campaign --out robot.json --json
+tooltip sample-1.json {tool} --out TIP.csv --json
+tooltip coupled.json {tool} --out TIP-coupled.csv --json
+robot tip robot.json {tool} --posture {posture} --out TIP-robot.csv --json
+robot check in/data/robots/tx200.toml --posture {posture} --json
+robot lobes in/data/robots/tx200.toml {tool} --posture {posture} {process} --out LOBES-robot.csv --json
+robot plan in/data/robots/tx200.toml --tests payload --count 1 --box "500 -1000 300 1600 1000 1800" --out POSTURES.csv --json
+advise sample-1.json {tool} --feed-per-tooth-mm 0.1 --depth-mm 1 --card CARD.html --json
+advise coupled.json {tool} --feed-per-tooth-mm 0.1 --json
+forces sample-1.json in/data/sample_runs/toolings/S2-PG25.toml in/data/sample_runs/recordings/S2-PG25-10_cut.h5 \
+ --air in/data/sample_runs/recordings/S2-PG25-10_air.h5 --speed-rpm 11077 --out FORCES.csv --json
+plan sample-1.json --toolings in/data/machines/toolings/S1-ER32.toml --target {tool} --out PLAN.toml --json
+export sample-1.json --to uff --tooling {tool} --out TIP.uff --json
 export sample-1.json --what modes --to json --out MODES.json --json
-learn {{e}}/MODES.toml {{e}}/TOOLING.toml --tests {{e}}/CUTS.csv {_PROCESS} --method zero-order --out LEARNT.json --json
-cases {{e}}/FLANGE.csv {{e}}/CASES.toml {_PROCESS} --json
-path remove {_POCKET} --out ENGAGEMENT.csv --json
-path stability --modes {{e}}/MODES.toml {_POCKET} {_PROCESS} --out STABILITY.csv --json
-path mill --modes {{e}}/MODES.toml {_POCKET} {_PROCESS} --out MILLED.csv --surface SURFACE.csv --json
-ring {{i}}/DRAWN.toml {{i}}/whole.wav --bare-tool {{i}}/tool.wav --mass-g {{{{mass}}}} --out RUNG.toml --json
-tap {{e}}/hits.csv --out TAPPED.csv --json
-listen {{e}}/sound.wav {{e}}/sound.flac --json
-import-tools {{e}}/LIBRARY.json --out toolings --json
+learn in/examples/MODES.toml in/examples/TOOLING.toml --tests in/examples/CUTS.csv {process} --method zero-order --out LEARNT.json --json
+cases in/examples/FLANGE.csv in/examples/CASES.toml {process} --json
+path remove {pocket} --out ENGAGEMENT.csv --json
+path stability --modes in/examples/MODES.toml {pocket} {process} --out STABILITY.csv --json
+path mill --modes in/examples/MODES.toml {pocket} {process} --out MILLED.csv --surface SURFACE.csv --json
+ring in/DRAWN.toml in/whole.wav --bare-tool in/tool.wav --mass-g {mass} --out RUNG.toml --json
+tap in/examples/hits.csv --out TAPPED.csv --json
+listen in/examples/sound.wav in/examples/sound.flac --json
+import-tools in/examples/LIBRARY.json --out toolings --json
 holders HSK-A63 ER32 --bore-mm 10 --json
-draw {{e}}/TOOLING.toml --out TOOL.svg --json
+draw in/examples/TOOLING.toml --out TOOL.svg --json
 materials --json
-""".replace("\\\n", "")
-    .strip()
-    .splitlines()
-]
+"""
 METHODS = ("zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain")
 TIPS = {
-    "sample": "sample-1.json in/data/machines/toolings/S3-PG25-long.toml",
-    "coupled": "coupled.json in/data/machines/toolings/S3-PG25-long.toml",
+    "sample": f"sample-1.json {_TOOL}",
+    "coupled": f"coupled.json {_TOOL}",
     "modes": f"--modes in/examples/MODES.toml in/examples/TOOLING.toml {_PROCESS}",
     "flange": f"in/examples/FLANGE.csv in/examples/TOOLING.toml {_PROCESS}",
 }
@@ -101,32 +102,32 @@ _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w])")
 _TIME = re.compile(r"\b\d+(?:\.\d+)? s\b")
 
 
-def commands(app_of_words: Any = app) -> Iterator[str]:
-    """Yield all command lines: the table, lobes by each method on each tip, help of every command, schemas."""
-    yield from COMMANDS
+def commands(mass: float) -> Iterator[str]:
+    """Yield all command lines: the table, lobes by each method on each tip, help of every command, schemas.
+
+    Parameters
+    ----------
+    mass : float [g]
+        Of the tool that rings.
+    """
+    yield from _COMMANDS.format(**_WORDS, mass=f"{mass:.6f}").strip().splitlines()
     for (name, tip), method in itertools.product(TIPS.items(), METHODS):
         # a march in time takes a hundred times as long as a map
         step = 3000 if method == "time-domain" else 500
         yield f"lobes {tip} --method {method} {_SPEEDS} {step} --out LOBES-{name}-{method}.csv --json"
-    for words in _help(app_of_words):
-        yield " ".join((*words, "--help"))
+    yield from _help(get_command(app), "")
     for noun in ("tooling", "campaign", "machine", "robot", "modes", "cases"):
         yield f"schema {noun} --out {noun}.schema.json"
 
 
-def _help(program: Any) -> Iterator[tuple[str, ...]]:
-    from typer.main import get_command
-
-    def walk(command: Any, words: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-        yield words
-        for name, inner in getattr(command, "commands", {}).items():
-            yield from walk(inner, (*words, name))
-
-    yield from walk(get_command(program), ())
+def _help(command: Any, words: str) -> Iterator[str]:
+    yield f"{words}--help"
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from _help(inner, f"{words}{name} ")
 
 
-def make_inputs(folder: Path) -> dict[str, str]:
-    """Simulate the campaigns into a folder, and return what commands must be told of them."""
+def make_inputs(folder: Path) -> float:
+    """Simulate the campaigns into a folder, and return the mass of the tool that rings [g]."""
     folder.mkdir()
     for name, place in {"data": "data", "examples": "docs/formats/examples", "fixtures": "tests/fixtures"}.items():
         (folder / name).symlink_to(ROOT / place, target_is_directory=True)
@@ -140,9 +141,8 @@ def make_inputs(folder: Path) -> dict[str, str]:
     write_hit(folder / "hit")
     robot_campaign(folder)
     (folder / "ROBOT.toml").write_text(toml_of(robot_keys(sheet())), encoding="utf-8")
-    by_hand.flange_file(folder / "FLANGE.csv")
     mass, _ = rung_tooling(folder)
-    return {"{mass}": f"{mass:.6f}"}
+    return mass
 
 
 def timeless(text: str) -> str:
@@ -158,12 +158,9 @@ def timeless(text: str) -> str:
 
 def run(folder: Path, only: Sequence[str]) -> None:
     """Run the commands in a folder, and write what each prints beside the files that it makes."""
-    told = make_inputs(folder / _INPUTS)
-    for line in commands():
+    for line in commands(make_inputs(folder / _INPUTS)):
         if only and not any(word in line for word in only):
             continue
-        for placeholder, value in told.items():
-            line = line.replace(placeholder, value)
         with contextlib.chdir(folder):
             answer = CliRunner().invoke(app, shlex.split(line), env={"COLUMNS": "100", "NO_COLOR": "1"})
         name = re.sub(r"[^\w.+-]+", "_", re.sub(rf"{_INPUTS}/\S*/", "", line))[:80]
