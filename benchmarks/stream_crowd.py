@@ -104,7 +104,7 @@ class Sender:
 
     def __init__(self, port: int, opening: str) -> None:
         self.link = socket.create_connection(("127.0.0.1", port))
-        self.rest, self.pongs, self.first, self.ready = memoryview(b""), b"", 0, False
+        self.rest, self.pongs, self.first, self.ticks, self.ready = memoryview(b""), b"", 0, 0, False
         self.link.sendall(
             b"GET /v1/forces/stream HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
             b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
@@ -167,7 +167,9 @@ def send(parent: Connection, port: int, opening: str, streams: int, per_second: 
         for k, each in enumerate(crowd):
             due = begin + (tick + k / streams) / per_second
             time.sleep(max(due - time.perf_counter(), 0.0))
-            counts["sent" if each.send(parts[tick % len(parts)], samples if lonely else 0) else "left out"] += 1
+            # each hears the record from its beginning, which is air: an observer settles on nothing else
+            counts["sent" if each.send(parts[each.ticks % len(parts)], samples if lonely else 0) else "left out"] += 1
+            each.ticks += 1
             counts["forces"] += each.read()
         tick += 1
         if not told and len(crowd) == streams and (lonely or all(each.ready for each in crowd)):
