@@ -13,21 +13,21 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rcsa_ident.remarks import Remark
+from rcsa_ident.base.remarks import Remark
 
 #: Places of all nouns that may be written, by the names under which they are stored. A name stays for ever, since jobs outlive an upgrade:
 #: where a class moves or is renamed, its place alone follows. Texts of an earlier release can be read as long as the fields stay.
 NOUNS = {
     "Dof": "rcsa_ident.dynamics.coordinates.Dof",
-    "Remark": "rcsa_ident.remarks.Remark",
+    "Remark": "rcsa_ident.base.remarks.Remark",
     "RecordCode": "rcsa_ident.signals.verdict.RecordCode",
     "FrfCode": "rcsa_ident.dynamics.passivity.FrfCode",
     "IdentificationCode": "rcsa_ident.identification.result.IdentificationCode",
-    "PlausibilityCode": "rcsa_ident.plausibility.PlausibilityCode",
+    "PlausibilityCode": "rcsa_ident.base.plausibility.PlausibilityCode",
     "FlangeCode": "rcsa_ident.machine.measured.FlangeCode",
     "SensorCode": "rcsa_ident.signals.recording.SensorCode",
     "CutterCode": "rcsa_ident.cutting.shape.CutterCode",
-    "RobotCode": "rcsa_ident.identification.posed.result.RobotCode",
+    "RobotCode": "rcsa_ident.identification.arm.result.RobotCode",
     "Verdict": "rcsa_ident.signals.verdict.Verdict",
     "AxisLines": "rcsa_ident.signals.frf.AxisLines",
     "CutMeasurement": "rcsa_ident.signals.measurement.CutMeasurement",
@@ -37,7 +37,7 @@ NOUNS = {
     "Candidate": "rcsa_ident.identification.candidate.Candidate",
     "CoupledSearch": "rcsa_ident.identification.coupled.fit.CoupledSearch",
     "CoupledLayout": "rcsa_ident.identification.coupled.parameters.CoupledLayout",
-    "PosedLayout": "rcsa_ident.identification.posed.parameters.PosedLayout",
+    "PosedLayout": "rcsa_ident.identification.arm.parameters.PosedLayout",
     "Stage": "rcsa_ident.identification.progress.Stage",
     "Step": "rcsa_ident.identification.progress.Step",
     "AxisSearch": "rcsa_ident.identification.joint_fit.AxisSearch",
@@ -49,7 +49,7 @@ NOUNS = {
     "ProcessDamping": "rcsa_ident.cutting.process.ProcessDamping",
     "SpeedVariation": "rcsa_ident.cutting.process.SpeedVariation",
     "MachineText": "api.work.requests.MachineText",
-    "CutSpec": "rcsa_ident.machining_setup.CutSpec",
+    "CutSpec": "rcsa_ident.setup.machining_setup.CutSpec",
     "ToolingSource": "api.work.requests.ToolingSource",
     "LobeRequest": "api.work.requests.LobeRequest",
     "PathRequest": "api.work.paths.PathRequest",

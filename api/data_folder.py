@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from api.processes import held
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 LOCK = "service.lock"
 #: The embedded databases: the store, and the steps of jobs.

@@ -25,8 +25,8 @@ from api.work.forces import ReadPair
 from api.work.requests import MachineText, ToolingSource
 from api.work.robots import parsed, posed_text
 from api.work.tips import tapped_text
-from rcsa_ident.errors import InputError
-from rcsa_ident.sample_files import sample_robots
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.sample_files import sample_robots
 from rcsa_ident.signals.recording import Sensor
 
 

@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 
 from api.files import Full, no_room
 from api.stores.entities import Damaged, NoRoom
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.validated_table import describe
 
 log = logging.getLogger("rcsa_ident.service")

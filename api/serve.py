@@ -13,8 +13,8 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from rcsa_ident.errors import InputError, no_cache
-from rcsa_ident.remarks import counted
+from rcsa_ident.base.errors import InputError, no_cache
+from rcsa_ident.base.remarks import counted
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help="The web service; settings come from RCSA_IDENT_... too.")
 

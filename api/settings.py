@@ -14,8 +14,8 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SecretsSettingsSource, SettingsConfigDict
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.scaleout import ADDRESS
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import ADDRESS
 
 PREFIX = "RCSA_IDENT_"
 MEGABYTE = 1_000_000

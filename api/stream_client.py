@@ -31,7 +31,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from api.streams.frames import packed, unpacked
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,7 @@ import ssl
 import time
 from pathlib import Path
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 log = logging.getLogger("rcsa_ident.service")
 #: Interval between two looks at the files [s].

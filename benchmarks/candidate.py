@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import Race
-from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
-from rcsa_ident.identification._kernels import modal_cross_frf
+from rcsa_ident.identification._kernels.frf import cross_frf, cross_frf_gradient
+from rcsa_ident.identification._kernels.lines import modal_cross_frf
 from rcsa_ident.identification.genetic_algorithm import modal_fractions
 from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE
 

@@ -60,7 +60,7 @@ def compiled(steps: Sequence[str] | None) -> dict[str, Any]:
     """Run steps of the warming in this process and return what they compile: module, name, signatures, seconds by phase."""
     from numba.core import event
 
-    from rcsa_ident.workflows.compile_kernels import STEPS
+    from rcsa_ident.front.compile_kernels import STEPS
 
     seconds: dict[tuple[str, str], Counter[str]] = {}
     signatures: Counter[tuple[str, str]] = Counter()

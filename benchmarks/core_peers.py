@@ -33,10 +33,10 @@ from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import flange_layout
 from rcsa_ident.identification.priors import Priors
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.uff import UffAxis, UffFunction, read_uff, write_uff
 from rcsa_ident.signals.spectra import line_spectrum
-from rcsa_ident.stability.adaptive_importance import adaptive_importance
+from rcsa_ident.stability.labels.adaptive_importance import adaptive_importance
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import free_body, tool_holder_poles, tool_holder_receptance, tool_holder_structure
 from rcsa_ident.tool_holder.turning import turning_pair

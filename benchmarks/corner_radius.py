@@ -32,10 +32,10 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.identification.evidence import EvidenceSelection
-from rcsa_ident.io.machines import MachineFile
-from rcsa_ident.io.setups import read_campaign, read_tooling
-from rcsa_ident.io.simulations import write_simulation
-from rcsa_ident.machining_setup import Campaign, Tooling
+from rcsa_ident.io.settings.machines import MachineFile
+from rcsa_ident.io.settings.setups import read_campaign, read_tooling
+from rcsa_ident.io.settings.simulations import write_simulation
+from rcsa_ident.setup.machining_setup import Campaign, Tooling
 from rcsa_ident.tool_holder.spread import EXACT
 from rcsa_ident.workflows.identify import identify, judge
 from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from rcsa_ident.io.recordings import read_cut
-from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.recordings.readers import read_cut
+from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.workflows.calibrate import calibrate
 
 FILES = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rcsa_ident.io.schemas import SCHEMAS, schema_of
+from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "formats"
 PAGE = FOLDER / "keys.md"

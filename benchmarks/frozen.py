@@ -32,14 +32,14 @@ from typer.testing import CliRunner
 from benchmarks.machines import turned_sample
 from benchmarks.rough_machines import rough_campaign
 from rcsa_ident.cli import app
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.robots import robot_keys
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.robots import robot_keys
 from rcsa_ident.io.toml_text import toml_of
-from rcsa_ident.samples import simulate_campaign
+from rcsa_ident.front.samples import simulate_campaign
 from tests.fixtures.hit import write_hit
 from tests.fixtures.rung_tooling import rung_tooling
-from tests.identification.posed.robots import sheet
-from tests.identification.posed.robots import write_campaign as robot_campaign
+from tests.identification.arm.robots import sheet
+from tests.identification.arm.robots import write_campaign as robot_campaign
 
 ROOT = Path(__file__).resolve().parent.parent
 #: What commands read; it is not compared.

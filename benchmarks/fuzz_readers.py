@@ -67,12 +67,12 @@ def _by_path(suffix: str, module: str, name: str, *further: Any) -> Read:
 
 
 def _recording(suffix: str, names: tuple[str, ...] = ("x", "y")) -> Read:
-    from rcsa_ident.errors import InputError
+    from rcsa_ident.base.errors import InputError
     from rcsa_ident.signals.recording import Quantity, Sensor
 
     def read(path: Path) -> None:
-        from rcsa_ident.io.open_recording import open_recording
-        from rcsa_ident.io.recordings import in_si, read_signals
+        from rcsa_ident.io.recordings.open_recording import open_recording
+        from rcsa_ident.io.recordings.readers import in_si, read_signals
 
         sensors = tuple(Sensor(name, Quantity.TRIGGER) for name in names)
         with suppress(InputError):
@@ -83,10 +83,10 @@ def _recording(suffix: str, names: tuple[str, ...] = ("x", "y")) -> Read:
 
 
 def _uff(path: Path) -> None:
-    from rcsa_ident.errors import InputError
-    from rcsa_ident.io.frf_files import read_frfs
-    from rcsa_ident.io.hammer import read_hammer
-    from rcsa_ident.io.open_recording import open_recording
+    from rcsa_ident.base.errors import InputError
+    from rcsa_ident.io.curves.frf_files import read_frfs
+    from rcsa_ident.io.curves.hammer import read_hammer
+    from rcsa_ident.io.recordings.open_recording import open_recording
 
     for read in (read_frfs, read_hammer):
         try:
@@ -97,9 +97,9 @@ def _uff(path: Path) -> None:
 
 
 def _frfs(path: Path) -> None:
-    from rcsa_ident.errors import InputError
-    from rcsa_ident.io.curves import read_frf_csv, read_tip
-    from rcsa_ident.io.frf_files import read_frfs
+    from rcsa_ident.base.errors import InputError
+    from rcsa_ident.io.curves.tips import read_frf_csv, read_tip
+    from rcsa_ident.io.curves.frf_files import read_frfs
 
     for read in (read_frf_csv, read_tip):
         try:
@@ -138,9 +138,9 @@ def _tapped(raw: bytes, folder: Path) -> None:
 
 
 def _tooling(raw: bytes, folder: Path) -> None:
-    from rcsa_ident.io.setups import tooling_of
+    from rcsa_ident.io.settings.setups import tooling_of
     from rcsa_ident.io.toml_text import keys_of_toml
-    from rcsa_ident.io.toolings import tooling_keys, tooling_text
+    from rcsa_ident.io.settings.toolings import tooling_keys, tooling_text
     from rcsa_ident.report.drawing import tooling_svg
 
     tooling = tooling_of(keys_of_toml(raw.decode("utf-8", "replace"), "tooling"), "given", "T")
@@ -170,14 +170,14 @@ def _campaign(raw: bytes, folder: Path) -> None:
 
 
 def _machine(raw: bytes, folder: Path) -> None:
-    from rcsa_ident.io.machines import machine_of
+    from rcsa_ident.io.settings.machines import machine_of
     from rcsa_ident.io.toml_text import keys_of_toml
 
     machine_of(keys_of_toml(raw.decode("utf-8", "replace"), "machine"), "given", "given", folder)
 
 
 def _cases(path: Path) -> None:
-    from rcsa_ident.io.cases import read_cases
+    from rcsa_ident.io.settings.cases import read_cases
     from tests.io.conftest import TOOLING
 
     (path.parent / "T.toml").write_text(TOOLING, encoding="utf-8")
@@ -189,7 +189,7 @@ def _cases(path: Path) -> None:
 
 
 def _json(raw: bytes, read: Callable[[Any, str], object], folder: Path) -> object:
-    from rcsa_ident.io.results import read_json
+    from rcsa_ident.io.results.parts import read_json
 
     path = folder / "given.json"
     path.write_bytes(raw)
@@ -197,8 +197,8 @@ def _json(raw: bytes, read: Callable[[Any, str], object], folder: Path) -> objec
 
 
 def _result(raw: bytes, folder: Path) -> None:
-    from rcsa_ident.io.identifications import machine_from_json
-    from rcsa_ident.io.results import check_result
+    from rcsa_ident.io.results.identifications import machine_from_json
+    from rcsa_ident.io.results.parts import check_result
 
     def read(data: Any, where: str) -> None:
         check_result(data, where)
@@ -208,20 +208,20 @@ def _result(raw: bytes, folder: Path) -> None:
 
 
 def _learnt(raw: bytes, folder: Path) -> None:
-    from rcsa_ident.io.learnt_tips import learnt_tip_of, learnt_tip_to_json
+    from rcsa_ident.io.results.learnt_tips import learnt_tip_of, learnt_tip_to_json
 
     _json(raw, lambda data, where: learnt_tip_to_json(learnt_tip_of(data, where)), folder)
 
 
 def _robot_result(raw: bytes, folder: Path) -> None:
-    from rcsa_ident.io.robot_results import robot_posterior_of
+    from rcsa_ident.io.results.robot_results import robot_posterior_of
 
     _json(raw, robot_posterior_of, folder)
 
 
 def _library(raw: bytes, folder: Path) -> None:
     from api.work.libraries import imported
-    from rcsa_ident.io.tool_libraries import Assumptions
+    from rcsa_ident.io.settings.tool_libraries import Assumptions
 
     imported(raw, Assumptions(), None)
 
@@ -231,7 +231,7 @@ def _library(raw: bytes, folder: Path) -> None:
 
 def _frames(raw: bytes, folder: Path) -> None:
     from api.streams.frames import samples_of, samples_of_text
-    from rcsa_ident.errors import InputError
+    from rcsa_ident.base.errors import InputError
 
     for read in (samples_of, lambda raw, channels: samples_of_text(raw.decode("utf-8", "replace"), channels)):
         try:
@@ -300,23 +300,23 @@ _IO = "rcsa_ident.io"
 
 
 def _posture_file(path: Path) -> None:
-    from rcsa_ident.io.postures import read_postures
-    from rcsa_ident.io.robots import read_robot
+    from rcsa_ident.io.settings.postures import read_postures
+    from rcsa_ident.io.settings.robots import read_robot
 
     read_postures(path, read_robot(Path(__file__).resolve().parent.parent / "data" / "robots" / "tx200.toml"))
 
 
 def _path_forces(path: Path) -> None:
-    from rcsa_ident.io.path_forces import read_path_forces
-    from rcsa_ident.io.paths import tool_path_of
+    from rcsa_ident.io.paths.path_forces import read_path_forces
+    from rcsa_ident.io.paths.tool_paths import tool_path_of
 
     read_path_forces(path, tool_path_of(seeds.PLACES, "given"))
 
 
 def _tool_path(suffix: str) -> Read:
     def read(path: Path) -> None:
-        from rcsa_ident.io.gcode import kept_words
-        from rcsa_ident.io.paths import read_tool_path, write_tool_path
+        from rcsa_ident.io.paths.gcode import kept_words
+        from rcsa_ident.io.paths.tool_paths import read_tool_path, write_tool_path
 
         found = read_tool_path(path)
         kept = kept_words(path)[0] if suffix == ".nc" else ()
@@ -329,7 +329,7 @@ def _tool_path(suffix: str) -> Read:
 
 def _mesh(kind: str) -> Read:
     def read(raw: bytes, folder: Path) -> object:
-        from rcsa_ident.io.meshes import mesh_of
+        from rcsa_ident.io.paths.meshes import mesh_of
 
         return mesh_of(raw, kind, "given")
 
@@ -404,6 +404,6 @@ TARGETS: Mapping[str, Target] = {
 def refusals() -> tuple[type[Exception], ...]:
     """Return what a reader raises on purpose."""
     from api.problems import Problem
-    from rcsa_ident.errors import InputError
+    from rcsa_ident.base.errors import InputError
 
     return InputError, Problem

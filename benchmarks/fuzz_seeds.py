@@ -101,7 +101,7 @@ def hdf5(folder: Path) -> list[bytes]:
 
 def sounds(*kinds: str) -> Seeds:
     def make(folder: Path) -> list[bytes]:
-        from tests.io.test_sound import tones, written
+        from tests.io.recordings.test_sound import tones, written
 
         return [written(folder, kind, tones(400)).read_bytes() for kind in kinds]
 
@@ -191,8 +191,8 @@ def of_repository(*names: str) -> Seeds:
 
 
 def results(folder: Path) -> list[str]:
-    from rcsa_ident.io.identifications import identification_to_json
-    from rcsa_ident.io.results import plain
+    from rcsa_ident.io.results.identifications import identification_to_json
+    from rcsa_ident.io.results.parts import plain
     from tests.fixtures import by_hand, coupled_by_hand
 
     campaign = by_hand.campaign(folder)
@@ -218,9 +218,9 @@ def learnts(folder: Path) -> bytes:
 
 
 def robot_results(folder: Path) -> str:
-    from rcsa_ident.identification.posed.parameters import PosedLayout
-    from rcsa_ident.io.results import plain
-    from rcsa_ident.io.robots import read_robot, robot_keys
+    from rcsa_ident.identification.arm.parameters import PosedLayout
+    from rcsa_ident.io.results.parts import plain
+    from rcsa_ident.io.settings.robots import read_robot, robot_keys
 
     sheet = read_robot(ROOT / "data" / "robots" / "tx200.toml")
     freedoms, bodies = sheet.freedoms(False), len(sheet.joints) + (sheet.payload is not None)
@@ -235,7 +235,7 @@ def robot_results(folder: Path) -> str:
     }
     rival = {"modes": 0, "unknowns": [0.1] * PosedLayout(springs, bodies, 0).size}
     top = {"kind": "robot", "schema_version": 1, "status": "converged", "robot": robot_keys(sheet), "tilts": False}
-    from rcsa_ident.io import robot_results
+    from rcsa_ident.io.results.parts import robot_results
 
     top |= {"kind": robot_results.KIND, "schema_version": robot_results.SCHEMA_VERSION}
     return json.dumps(plain(top | {"posterior": table | {"rivals": [rival]}}))
@@ -292,7 +292,7 @@ GCODE = "%\nO1 (POCKET)\nG21 G90 G17\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F300\nG2 X10
 
 def surfaces(kind: str) -> Seeds:
     def make(folder: Path) -> list[bytes]:
-        from rcsa_ident.io.meshes import write_mesh
+        from rcsa_ident.io.paths.meshes import write_mesh
         from tests.toolpath.test_surface_kernels import box
 
         write_mesh(folder / f"m.{kind}", *box(np.zeros(3), np.array([0.04, 0.02, 0.01])))
@@ -302,7 +302,7 @@ def surfaces(kind: str) -> Seeds:
 
 
 def urdfs(folder: Path) -> list[str]:
-    from rcsa_ident.io.robots import read_robot
+    from rcsa_ident.io.settings.robots import read_robot
     from tests.io.urdf_files import random_urdf, urdf_of
 
     arm = read_robot(ROOT / "data" / "robots" / "tx200.toml")
@@ -312,7 +312,7 @@ def urdfs(folder: Path) -> list[str]:
 def motion(folder: Path) -> bytes:
     from scipy.io import savemat
 
-    from tests.io.test_robot_records import structs
+    from tests.io.recordings.test_robot_records import structs
 
     rows = np.ones((3, 30))
     savemat(folder / "r.mat", structs(np.arange(30) * 0.1, rows, rows, rows))
@@ -335,7 +335,7 @@ def wavs(folder: Path) -> list[bytes]:
 
 
 def zipped_library(folder: Path) -> bytes:
-    from tests.io.test_tool_libraries import zipped
+    from tests.io.settings.test_tool_libraries import zipped
 
     return zipped(libraries(folder)[0])
 
@@ -345,6 +345,6 @@ def programs(folder: Path) -> list[bytes]:
 
 
 def cases(folder: Path) -> str:
-    from tests.io.test_cases import TEXT
+    from tests.io.settings.test_cases import TEXT
 
     return TEXT

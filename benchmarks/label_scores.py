@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.units import from_rpm
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.base.units import from_rpm
 
 #: Draws of the prior, without softening; random orders.
 POOL, ORDERS = 6000, 10

@@ -26,15 +26,15 @@ from benchmarks.page import DOCS, append_row, read_rows, write_block, write_rows
 from benchmarks.rough import KINDS, identified
 from benchmarks.rough_machines import ROUGH, ROUGH_DEVELOPMENT, RoughMachine, rough_campaign, truth_of
 from benchmarks.study import read_cut
-from rcsa_ident.arrays import ComplexArray
+from rcsa_ident.base.arrays import ComplexArray
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.io.curves import read_frf_csv
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.results import read_result
-from rcsa_ident.io.setups import read_campaign
-from rcsa_ident.io.simulations import true_name
-from rcsa_ident.machining_setup import Campaign, HammerTest, Tooling
+from rcsa_ident.io.curves.tips import read_frf_csv
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.results.parts import read_result
+from rcsa_ident.io.settings.setups import read_campaign
+from rcsa_ident.io.settings.simulations import true_name
+from rcsa_ident.setup.machining_setup import Campaign, HammerTest, Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.virtual.rotor import frequency_response, rotor

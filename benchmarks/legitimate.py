@@ -30,7 +30,7 @@ from api.work.tasks import MOST_LINES
 from benchmarks.request_cost import Cost, cost_of
 from benchmarks.service import ask, machine_text, new_tooling, serving
 from benchmarks.uploads import SAMPLES, campaign_of, recording
-from rcsa_ident.io.setups import tooling_of
+from rcsa_ident.io.settings.setups import tooling_of
 from rcsa_ident.tool_holder.free_modes import bending_modes
 from rcsa_ident.tool_holder.taper import hung
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity
 
 #: Sampling rates [Hz] and spindle speeds [rev/min] that are drawn.

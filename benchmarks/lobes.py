@@ -16,7 +16,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.tool_holder.model import tool_holder_poles

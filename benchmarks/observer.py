@@ -23,8 +23,8 @@ import numpy as np
 
 from benchmarks.timing import Race, best_of, row
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.results import read_result
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.observer._kernels import kalman_steps
 from rcsa_ident.observer.kalman import KalmanFilter
 from rcsa_ident.observer.tuning import ObserverMethod, PaperWalk, Resonators

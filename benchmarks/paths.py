@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import row
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.io.paths import read_tool_path
+from rcsa_ident.io.paths.tool_paths import read_tool_path
 from rcsa_ident.machine.known_tip import KnownTip
-from rcsa_ident.machining_setup import BareCutter, CutSpec
+from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.units import from_rpm
-from rcsa_ident.workflows.path_milling import mill_path
-from rcsa_ident.workflows.path_removal import field_of, remove_along
-from rcsa_ident.workflows.path_stability import cuts_along, stations_along
+from rcsa_ident.base.units import from_rpm
+from rcsa_ident.workflows.paths.milling import mill_path
+from rcsa_ident.workflows.paths.removal import field_of, remove_along
+from rcsa_ident.workflows.paths.stability import cuts_along, stations_along
 from rcsa_ident.workflows.tool_change import ToolChange
 
 TOOL, FEED = BareCutter("end mill", Cutter(3, 0.01, np.radians(30.0))), 5e-5

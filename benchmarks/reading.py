@@ -91,11 +91,11 @@ def judge(path: Path) -> str:
     from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
     from rcsa_ident.cutting.cutter import Cutter
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io.recordings import read_cut
-    from rcsa_ident.machining_setup import Cut
+    from rcsa_ident.io.recordings.readers import read_cut
+    from rcsa_ident.setup.machining_setup import Cut
     from rcsa_ident.signals.measurement import measure_cut
     from rcsa_ident.signals.recording import Quantity, Sensor
-    from rcsa_ident.units import rpm
+    from rcsa_ident.base.units import rpm
 
     names = [f"ch{i + 1}" for i in range(4)] if path.suffix == ".wav" else NAMES
     kinds = [(Quantity.DISPLACEMENT, 1e4)] * 2 + [(Quantity.ACCELERATION, 1e-3)] * 2

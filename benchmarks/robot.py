@@ -21,7 +21,7 @@ from rcsa_ident.machine.robot.inertia import accelerations, mass_matrix, torques
 from rcsa_ident.machine.robot.kinematics import posed
 from rcsa_ident.machine.robot.model import Chain
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
-from rcsa_ident.samples import sample_robot, sample_tooling
+from rcsa_ident.front.samples import sample_robot, sample_tooling
 
 #: Postures in a loop.
 MANY = 1000

@@ -14,17 +14,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.samples import sample_robot
+from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.toolpath.march import Carrier, Cut, March, mill_block
 from rcsa_ident.toolpath.surface import roughness
 from rcsa_ident.toolpath.walls import Walls
 from rcsa_ident.virtual.milling import rigid_force_lines
-from rcsa_ident.workflows.robot_milling import arm_carrier, feed_turn
+from rcsa_ident.workflows.paths.robot_milling import arm_carrier, feed_turn
 
 POSTURE = np.radians([-11.71, 20.78, 147.86, 82.76, 60.80, -166.96])
 SIDES = (-np.inf, -0.001)

@@ -25,11 +25,11 @@ from benchmarks.page import DOCS, append_row, read_rows, write_block, write_rows
 from benchmarks.rough_machines import ROUGH, rough_campaign, truth_of
 from benchmarks.study import read_cut, warm
 from rcsa_ident.identification.evidence import EvidenceSelection
-from rcsa_ident.io.curves import read_frf_csv
-from rcsa_ident.io.identifications import identification_to_json, machine_from_json
-from rcsa_ident.io.results import read_result, write_result
-from rcsa_ident.io.setups import read_campaign
-from rcsa_ident.io.simulations import true_name
+from rcsa_ident.io.curves.tips import read_frf_csv
+from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
+from rcsa_ident.io.results.parts import read_result, write_result
+from rcsa_ident.io.settings.setups import read_campaign
+from rcsa_ident.io.settings.simulations import true_name
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.tool_holder.spread import EXACT
 from rcsa_ident.workflows.identify import data_of, judge, left_out

@@ -23,10 +23,10 @@ from benchmarks.recommendation import DEEPEST, FEED, Truth, drawn_cut
 from benchmarks.rough import KINDS
 from benchmarks.rough_machines import ROUGH, RoughMachine, rough_machine
 from rcsa_ident.cutting.conditions import CuttingConditions
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.results import read_result
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.machine.machine import TipSource
-from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.setup.machining_setup import CutSpec
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
 from rcsa_ident.workflows.advise import advise

@@ -142,7 +142,7 @@ def machine_text() -> str:
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.parameters import AxisLayout, pack, parameter_names, simple_axis
     from rcsa_ident.identification.posterior import Posterior
-    from rcsa_ident.io.results import plain, spindle_to_json
+    from rcsa_ident.io.results.parts import plain, spindle_to_json
 
     natural = 2.0 * np.pi * np.array([620.0, 998.0, 1285.0, 1820.0, 2330.0, 3100.0, 3970.0])
     psi = np.array([[0.1, 0.6], [0.15, 1.5], [0.2, -1.0], [0.25, 3.0], [0.2, -4.0], [0.12, 6.0], [0.15, 8.0]])

@@ -27,7 +27,7 @@ from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TipModes
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 DEEPEST = 20e-3
 SHARES = (0.0, 0.05, 0.5, 0.95, 1.0)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.machines import CONDITIONS, drawn, is_coupled
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 #: Aims for toolings that never cut, and what no run that calls itself converged may exceed.
 AIMS, WORST = {"similar": 0.01, "different": 0.025}, 0.05

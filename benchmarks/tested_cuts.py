@@ -65,9 +65,9 @@ def _case(folder: Path, number: int, name: str, radial_mm: float, feed: str) -> 
     from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
     from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.dynamics.receptance import Receptance
-    from rcsa_ident.io.cuts import FEED_DIRECTIONS
-    from rcsa_ident.io.machines import read_machine
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
+    from rcsa_ident.io.settings.machines import read_machine
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.stability.lobes import stability_lobes
     from rcsa_ident.stability.tip_modes import TIP
     from rcsa_ident.virtual.limit import multiplier

@@ -61,7 +61,7 @@ def _disk(source: Path, target: Path) -> float:
 
 def recording(path: Path) -> Path:
     """Write four channels of a cut at 51.2 kHz, as long as `SIZE` asks for."""
-    from rcsa_ident.io.hdf5 import write_hdf5
+    from rcsa_ident.io.recordings.hdf5 import write_hdf5
 
     rng = np.random.default_rng(1)
     count = SIZE // 16

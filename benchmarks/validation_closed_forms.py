@@ -25,13 +25,13 @@ from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.observer.force_model import RandomWalk
 from rcsa_ident.observer.kalman import kalman_filter, riccati
 from rcsa_ident.observer.margins import loop_margins
-from rcsa_ident.signals.ring_down import ring_down
+from rcsa_ident.signals.sound.ring_down import ring_down
 from rcsa_ident.signals.tap import tap
 from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
 from rcsa_ident.stability.surface_error import surface_location_error
 from rcsa_ident.toolpath.march import Carrier, Cut, march, start_of
 from rcsa_ident.toolpath.walls import NOTHING, Walls
-from rcsa_ident.units import to_hz
+from rcsa_ident.base.units import to_hz
 from tests.cutting import test_force
 from tests.observer import test_kalman
 from tests.oracles import literature, naive
@@ -397,7 +397,7 @@ CASES = (
         rung,
         "Hz",
         5e-4,
-        "tests/signals/test_ring_down.py::test_frequencies_and_damping_are_those_that_were_written",
+        "tests/signals/sound/test_ring_down.py::test_frequencies_and_damping_are_those_that_were_written",
     ),
     *(
         Case(

@@ -15,10 +15,10 @@ from benchmarks.validation_files import CUTS, FILES, HAMMER, calibrated
 from benchmarks.validation_stability import peak, robot_row
 from benchmarks.validation_study import MISSED
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.samples import sample_robot
+from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.toolpath.march import mill_block
 from rcsa_ident.toolpath.surface import roughness
-from rcsa_ident.workflows.robot_milling import arm_carrier, feed_turn
+from rcsa_ident.workflows.paths.robot_milling import arm_carrier, feed_turn
 
 
 def missed(name: str, source: str, expected: Any, ours: Any, unit: str, why: str, **more: Any) -> Case:

@@ -15,7 +15,7 @@ from rcsa_ident.cutting.materials import material
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.samples import sample_robot
+from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
@@ -27,7 +27,7 @@ from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.toolpath.march import mill_block
 from rcsa_ident.virtual.limit import true_limit
-from rcsa_ident.workflows.robot_milling import arm_carrier, feed_turn
+from rcsa_ident.workflows.paths.robot_milling import arm_carrier, feed_turn
 from tests.cutting import test_deflection as bent
 from tests.oracles import literature
 from tests.stability import mills, shaped_mills, test_unlike_teeth, test_zero_order
@@ -189,7 +189,7 @@ def coefficients() -> list[float]:
 
 _FULL, _SHAPED = "tests/stability/test_full_discretisation.py", "tests/stability/test_shaped_mills.py"
 _TWO_ROADS = "Hill's determinant and a marched multiplier of another program, which agree to 1e-4"
-_ROBOT = "tests/workflows/test_robot_milling.py::test_forces_are_those_of_the_published_simulation"
+_ROBOT = "tests/workflows/paths/test_robot_milling.py::test_forces_are_those_of_the_published_simulation"
 _KINDS = {
     "45° face mill": ("A", "A, Z rigid", "A, Z soft", "A, corner", "A Ø100", "A Ø160"),
     "45° face mill whose tip tilts": ("A, slope -4", "A, slope -7", "A Ø100, slope -7", "A Ø160, slope -7"),

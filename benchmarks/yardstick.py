@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.comparison import FREQUENCY, relative_error
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER, IdentificationData
-from rcsa_ident.io.curves import read_frf_csv
-from rcsa_ident.io.machines import MachineFile
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.curves.tips import read_frf_csv
+from rcsa_ident.io.settings.machines import MachineFile
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine
 
 #: Model error of the misfit.

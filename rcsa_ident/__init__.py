@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Coordinate, Dof
     from rcsa_ident.dynamics.modal import normal_modes
     from rcsa_ident.dynamics.receptance import Receptance
-    from rcsa_ident.errors import InputError
-    from rcsa_ident.io.curves import read_tip
-    from rcsa_ident.io.forces import read_forces
-    from rcsa_ident.io.lobes import read_lobes
-    from rcsa_ident.io.recordings import read_recording
-    from rcsa_ident.io.robot_results import read_robot_result
-    from rcsa_ident.io.robots import read_robot
-    from rcsa_ident.io.setups import read_campaign, read_tooling
+    from rcsa_ident.base.errors import InputError
+    from rcsa_ident.io.curves.tips import read_tip
+    from rcsa_ident.io.curves.forces import read_forces
+    from rcsa_ident.io.curves.lobes import read_lobes
+    from rcsa_ident.io.recordings.readers import read_recording
+    from rcsa_ident.io.results.robot_results import read_robot_result
+    from rcsa_ident.io.settings.robots import read_robot
+    from rcsa_ident.io.settings.setups import read_campaign, read_tooling
     from rcsa_ident.machine.known_tip import KnownTip
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
-    from rcsa_ident.machining_setup import CutSpec, Tooling
-    from rcsa_ident.recorded import listen, ring, tap
-    from rcsa_ident.samples import sample_robot, sample_tooling
+    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+    from rcsa_ident.front.recorded import listen, ring, tap
+    from rcsa_ident.front.samples import sample_robot, sample_tooling
     from rcsa_ident.signals.recording import Quantity, Sensor
     from rcsa_ident.stability.full_discretisation import FullDiscretisation
     from rcsa_ident.stability.lobes import stability_lobes
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     from rcsa_ident.stability.tip_modes import TipModes
     from rcsa_ident.stability.zero_order import ZeroOrder
     from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, clamped
-    from rcsa_ident.units import hz, rpm
-    from rcsa_ident.verbs import (
+    from rcsa_ident.base.units import hz, rpm
+    from rcsa_ident.front.verbs import (
         advise,
         connect,
         estimate_forces,

@@ -25,7 +25,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 #: Fixtures behind which a browser, a service, a database or a cluster runs: whoever asks for one is slow.
 _PROCESSES = {"browser", "served", "postgres_server"}
 #: Rooms whose files share what takes long to make.
-_SHARED = ("tests/web/", "tests/front_door/")
+_SHARED = ("tests/web/", "tests/front/")
 #: Seconds of each function by its file, as the last whole run has found them.
 _DURATIONS = Path(__file__).with_name("durations.json")
 _seconds: Counter[str] = Counter()

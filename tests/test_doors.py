@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from api.client import Client
 from rcsa_ident.cli import app
 from rcsa_ident.cli.demo import _page
-from rcsa_ident.io.curves import read_lobes_csv
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.results import read_result
+from rcsa_ident.io.curves.tips import read_lobes_csv
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.report.html import report_html
 from rcsa_ident.report.summaries import lobes_summary
 from tests.api.in_process import embedded, service

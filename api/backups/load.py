@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 from api.backups.members import BLOCK, ENGINE, FORMAT, MANIFEST, MEMBER, STORE, Account, copy, disk
 from api.files import sync_folder
 from api.stores.database import version_in
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 _LARGEST_MANIFEST = 1 << 28
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from api.files import NORMALISED, UPLOADS
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 STORE, ENGINE, MANIFEST, FILES = "service.db", "jobs.db", "manifest.json", "files"
 FORMAT, BLOCK, CHUNK = 1, 512, 1 << 20

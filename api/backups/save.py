@@ -19,7 +19,7 @@ from api.backups.members import BLOCK, ENGINE, FILES, FORMAT, MANIFEST, STORE, A
 from api.files import NORMALISED, UPLOADS, Files, sync_folder
 from api.processes import held
 from api.stores.sql import open_store
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.version import __version__
 
 _STAGING = ".backup-"

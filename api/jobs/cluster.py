@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from typing import Any
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.scaleout import ClusterLost, Map, cluster_map
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import ClusterLost, Map, cluster_map
 
 log = logging.getLogger("rcsa_ident.jobs")
 

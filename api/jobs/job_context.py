@@ -15,8 +15,8 @@ from api.codec import Unknown, decode, encode
 from api.jobs.backend import VERSION, Remember
 from api.stores.entities import Unavailable
 from api.stores.jobs import Event, Jobs
-from rcsa_ident.errors import InputError
-from rcsa_ident.scaleout import Map
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import Map
 
 log = logging.getLogger("rcsa_ident.jobs")
 #: Said by a job whose memory is of no use.

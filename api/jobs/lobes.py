@@ -14,8 +14,8 @@ from api.stores.jobs import PARTIAL, Job, Outcome
 from api.work import tasks
 from api.work.pool import guarded
 from api.work.requests import LobeRequest, MachineText, ToolingSource
-from rcsa_ident.errors import InputError
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz, to_rpm
 
 #: Of the progress, which counts speeds over all toolings.
 STAGE = "speeds"

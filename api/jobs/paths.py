@@ -13,7 +13,7 @@ from api.work import paths
 from api.work.paths import PathRequest
 from api.work.pool import guarded
 from api.work.requests import MachineText, ToolingSource
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 #: What makes a job shorter, by its kind.
 _SHORTER = {

@@ -22,7 +22,7 @@ from api.jobs.job_context import TOO_LARGE, Faulty, JobContext, Outdated, Stoppe
 from api.log_lines import tell, telling
 from api.stores.entities import Damaged, Unavailable
 from api.stores.jobs import Job, Jobs, Outcome, Worker
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 log = logging.getLogger("rcsa_ident.jobs")
 #: Intervals between two polls for new jobs, two heartbeats and two rounds of housekeeping, and time without a sign of life after which a

@@ -25,7 +25,7 @@ from api.streams.hub import Full, Hub
 from api.streams.listener import Listener
 from api.streams.session import End, Session, Stage
 from api.work.pool import Busy
-from rcsa_ident.errors import InputError, Unsteady
+from rcsa_ident.base.errors import InputError, Unsteady
 
 log = logging.getLogger("rcsa_ident.service")
 #: Time limits for sending what remains at the end, and for finding a steady part to design the observer from [s].

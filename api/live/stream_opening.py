@@ -22,10 +22,10 @@ from api.streams.session import About, Session, Stage
 from api.work.forces import ReadPair, sensors_of
 from api.work.pool import Work
 from api.work.requests import MachineText, ToolingSource
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Sensor
-from rcsa_ident.units import from_rpm
+from rcsa_ident.base.units import from_rpm
 
 #: Fewest revolutions to design an observer from.
 REVOLUTIONS = 12

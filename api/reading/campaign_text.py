@@ -11,13 +11,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from api.work.toolings import parsed, weigh
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import READERS
-from rcsa_ident.io.setups import campaign_of
-from rcsa_ident.io.setups import tooling_of as tooling_of_keys
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.recordings.readers import READERS
+from rcsa_ident.io.settings.setups import campaign_of
+from rcsa_ident.io.settings.setups import tooling_of as tooling_of_keys
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.machining_setup import Campaign, Tooling
+from rcsa_ident.setup.machining_setup import Campaign, Tooling
 
 #: Role of a file that holds FRFs of hammer tests.
 HAMMER = "hammer"

@@ -11,9 +11,9 @@ from api.files import NORMALISED, Files
 from api.reading.campaign_text import campaign_of_text
 from api.reading.stored import Samples
 from api.stores.entities import Store
-from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.errors import InputError
-from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.signals.recording import Recording
 
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]

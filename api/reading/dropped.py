@@ -9,7 +9,7 @@ from typing import Any
 
 from api.reading.campaign_text import MOST_TOOLINGS, TOOLING_NAME, Library, declare, recording_name
 from api.work.toolings import LARGEST, differences, parsed, tooling_of
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.toml_text import keys_of_toml
 
 

@@ -16,7 +16,7 @@ from api.stores.campaigns import Campaign
 from api.stores.entities import Taken, Unavailable, digest_of
 from api.work import examples
 from api.work.pool import Busy, Work
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
 MACHINE = "Example machine"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from api.reading.samples import blocks, length
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.steady_part import hann
 

@@ -30,7 +30,7 @@ from api.reading import reader_tasks
 from api.reading.room import Room
 from api.shares import FairThreads
 from api.work.pool import Busy
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
 #: Time limit for the start of the process, including imports and compilation [s].

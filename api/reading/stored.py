@@ -10,7 +10,7 @@ from typing import Any
 from api.files import NORMALISED, UPLOADS, Files, sha256_of
 from api.stores.campaigns import Recording
 from api.stores.entities import Damaged, digest_of, whole
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 _MEND = "upload the same recording again"
 

@@ -23,7 +23,7 @@ from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.changes import Note
 from api.stores.entities import Damaged, NoRoom, Store, Taken, Unavailable
 from api.work.pool import Busy, Work
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
 #: Interval of the maintenance [s].

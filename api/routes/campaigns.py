@@ -36,7 +36,7 @@ from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import Damaged, Taken
 from api.transfer.archives import zipped
 from api.work.toolings import parsed
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.status import too_few
 from rcsa_ident.io.toml_text import toml_of
 

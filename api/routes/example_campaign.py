@@ -20,7 +20,7 @@ from api.security import Caller, Guarded, WhoAsks, now
 from api.stores.campaigns import Campaign
 from api.stores.entities import ABSENT, Document, Machine, Stale, Taken, digest_of
 from api.transfer.body_stream import check_room
-from rcsa_ident.remarks import counted
+from rcsa_ident.base.remarks import counted
 
 router = APIRouter(prefix="/examples/campaign", tags=["examples"], route_class=Guarded)
 _WHY = "part of the example"

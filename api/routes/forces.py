@@ -27,7 +27,7 @@ from api.transfer.body_stream import storage_problems
 from api.transfer.multipart import FORM, form
 from api.work.forces import ForceQuestion, ReadPair, forces, sensors_of
 from api.work.requests import MachineText, ToolingSource
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.signals.recording import Sensor
 
 router = APIRouter(tags=["forces"], route_class=Guarded)

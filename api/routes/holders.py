@@ -10,7 +10,7 @@ from api.conventions import guard, problems
 from api.schemas.holders import CatalogueAnswer, ChuckAnswer, Holders, TypicalContactAnswer
 from api.schemas.toolings import HolderKeys, SpreadKeys
 from api.security import Guarded
-from rcsa_ident.io.toolings import contact_spread_keys, holder_keys, typical_contact_keys
+from rcsa_ident.io.settings.toolings import contact_spread_keys, holder_keys, typical_contact_keys
 from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, tapers
 
 router = APIRouter(prefix="/holders", tags=["toolings"], route_class=Guarded)

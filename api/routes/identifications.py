@@ -20,7 +20,7 @@ from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.jobs import Job
 from api.work import tasks
 from api.work.machine_cache import starts
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], route_class=Guarded)
 KIND = "identification"

@@ -23,7 +23,7 @@ from api.stores.entities import ABSENT, Document, Expected, Stale, digest_of
 from api.work.learning import learn
 from api.work.requests import MachineText, TooLong, anonymous
 from api.work.toolings import parsed
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.toml_text import toml_of
 
 router = APIRouter(prefix="/campaigns/{id}/learn", tags=["campaigns"], route_class=Guarded)

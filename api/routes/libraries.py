@@ -17,8 +17,8 @@ from api.schemas.libraries import ImportAnswer, ImportedTool
 from api.security import Caller, Guarded, WhoAsks, now
 from api.stores.entities import ABSENT, Document, Stale, digest_of
 from api.work.libraries import LARGEST_LIBRARY, imported
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.tool_libraries import Assumptions
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.tool_libraries import Assumptions
 
 router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)
 JSON, ZIP = "application/json", "application/zip"

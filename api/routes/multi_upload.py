@@ -20,7 +20,7 @@ from api.stores.entities import Damaged, NoRoom
 from api.transfer.body_stream import announced_length, check_room, complete, refuse_encoded, write
 from api.transfer.multipart import FORM, Head, events
 from api.work.pool import Busy
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 _FORM = {

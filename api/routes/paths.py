@@ -27,7 +27,7 @@ from api.transfer.body_stream import announced_length, check_room, refuse_encode
 from api.transfer.multipart import FORM, form
 from api.work import paths as work
 from api.work.requests import MachineText, ToolingSource
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 router = APIRouter(prefix="/paths", tags=["paths"], route_class=Guarded)
 CSV, GCODE, KIND = "text/csv", "text/x-gcode", "path"

@@ -35,7 +35,7 @@ from api.transfer.body_stream import (
     storage_problems,
 )
 from api.transfer.parts_of_file import PartsOfFile
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"

@@ -37,7 +37,7 @@ from api.transfer.body_stream import (
     storage_problems,
     write,
 )
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 _PART = {"required": True, "content": {BINARY: {"schema": {"type": "string", "format": "binary"}}}}

@@ -22,7 +22,7 @@ from api.security import Guarded, WhoAsks
 from api.stores.entities import digest_of
 from api.transfer.body_stream import announced_length, check_room, refuse_encoded, storage_problems
 from api.transfer.multipart import FORM, form
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 router = APIRouter(tags=["listen"], route_class=Guarded)
 JSON = "application/json"

@@ -21,8 +21,8 @@ from api.schemas.robots import EXAMPLE, RobotAnswer, RobotKeys, RobotSummary
 from api.security import Guarded, WhoAsks, now
 from api.stores.entities import Document, digest_of, summary_of
 from api.work import robots as work
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.paths import tool_path_of
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.paths.tool_paths import tool_path_of
 from rcsa_ident.io.toml_text import toml_of
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=Guarded)

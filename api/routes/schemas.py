@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path
 from api.conventions import guard, problems
 from api.problems import Problem
 from api.security import Guarded
-from rcsa_ident.io.schemas import SCHEMAS, schema_of
+from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of
 
 router = APIRouter(prefix="/schemas", tags=["toolings"], route_class=Guarded)
 

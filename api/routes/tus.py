@@ -27,7 +27,7 @@ from api.routes.resumable_upload import Checksum, Upload, alone, finish, receive
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
 from api.transfer.body_stream import check_room, storage_problems
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 VERSION = "1.0.0"
 EXTENSIONS = "creation,termination,checksum"

@@ -9,8 +9,8 @@ from pydantic import Field, ValidationError
 from api.schemas.common import Answer, Body
 from api.schemas.queries import TestedCut
 from api.schemas.versions import Difference
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.tested_cuts import COLUMNS
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.tested_cuts import COLUMNS
 
 #: Fields of one tooling that are told; 200 toolings of 400 segments would differ in 300 000.
 MOST_DIFFERENCES = 50

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 from api.schemas.common import Answer, Body, within
 from api.schemas.queries import Tooling
 from api.schemas.toolings import EXAMPLE, ToolingKeys
-from rcsa_ident.plausibility import RATE
+from rcsa_ident.base.plausibility import RATE
 
 Rate = Annotated[float, within(RATE)]
 

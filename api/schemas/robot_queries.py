@@ -12,7 +12,7 @@ from api.schemas.robots import EXAMPLE, Posed
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.work.requests import LobeRequest
 from api.work.robots import MOST_LIMITS, MOST_PLACES
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.methods import MethodName
 
 Coordinate = Annotated[float, Field(ge=-20_000.0, le=20_000.0)]

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, StringConstraints
 from api.schemas.common import Answer, Body, Line
 from rcsa_ident.cutting.serration import WaveShape
 from rcsa_ident.cutting.shape import CutterShape
-from rcsa_ident.io.cutters import MOST_POINTS
+from rcsa_ident.io.settings.cutters import MOST_POINTS
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 MOST_SEGMENTS, MOST_TEETH = 200, 100

@@ -16,7 +16,7 @@ from api.stores import tables
 from api.stores.engines import engine_of
 from api.stores.entities import Destroyed, NoRoom, Unavailable
 from api.stores.migrations import migrate, version_of
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 #: Time [s] for which a count of a group's rows is added to instead of taken again: among very many rows it takes a while.
 COUNTED = 5.0

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 
 class Backlog:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from api.codec import decode
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     # not at run time: the service itself does not load the observers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 
 def envelope(values: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 
 HEADER = struct.Struct("<QII")
 #: Most samples of a frame, and the highest index: the largest integer that doubles, and so JSON readers, count exactly.

@@ -20,7 +20,7 @@ from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, REFUSED, Mess
 from api.streams.listener import Listener
 from api.streams.process import Host
 from api.streams.session import About, End, Session, Stage
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 log = logging.getLogger("rcsa_ident.service")
 #: Most frames of a session per second, each of which costs as much as hundreds of samples, and the seconds that may come at once: behind

@@ -9,7 +9,7 @@ from typing import Any
 
 from api.streams.envelope import Envelope
 from api.streams.frames import packed
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 #: Most bytes of frames and most texts that wait for a slow reader.
 WAITING_BYTES, WAITING_TEXTS = 4_000_000, 32

@@ -16,7 +16,7 @@ from api.log_lines import ids
 from api.streams.backlog import Backlog
 from api.streams.counts import Counts
 from api.streams.listener import Listener
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 #: Samples per block, and blocks of a session under computation at once: no session waits long for another.
 BLOCK, FLYING = 4096, 4

@@ -14,10 +14,10 @@ from api.work.machine_cache import is_result, read
 from api.work.requests import MachineText, ToolingSource
 from api.work.toolings import tooling_from, weigh
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.signals.recording import Recording, Sensor
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.units import to_hz, to_rpm
 
 #: Buckets of an answer's envelope, and most samples of one answer.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000
@@ -62,7 +62,7 @@ def sensors_of(text: str) -> tuple[Sensor, ...]:
     """Return the sensors of a RESULT.json."""
     import json
 
-    from rcsa_ident.io.forces import sensors_of_result
+    from rcsa_ident.io.curves.forces import sensors_of_result
 
     try:
         return sensors_of_result(json.loads(text) if is_result(text) else {"sensors": {}}, "")
@@ -82,7 +82,7 @@ def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion
         Reads the recording and its air cut.
     csv : Path, optional
     """
-    from rcsa_ident.io.forces import write_forces_csv
+    from rcsa_ident.io.curves.forces import write_forces_csv
     from rcsa_ident.observer.force import restore_mean_force
 
     known, tool = read(machine.text), tooling_from(tooling)

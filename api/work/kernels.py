@@ -34,7 +34,7 @@ class Kernels:
 
         A process that may lock nothing loads what is compiled; the rest it compiles where it is needed.
         """
-        from rcsa_ident.workflows.compile_kernels import STEPS
+        from rcsa_ident.front.compile_kernels import STEPS
 
         for name in names:
             if self.folder is not None and not (mark := self.folder / f"{name}.done").exists():

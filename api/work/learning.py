@@ -9,12 +9,12 @@ from api.work import tasks
 from api.work.machine_cache import is_result, parsed
 from api.work.requests import MachineText
 from api.work.toolings import keys_of
-from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.results import layout, plain
-from rcsa_ident.io.taught_results import taught_result
-from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.results.parts import layout, plain
+from rcsa_ident.io.results.updated_results import taught_result
+from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.signals.recording import Recording
 
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]

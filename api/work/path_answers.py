@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import surface_made_by
 from rcsa_ident.toolpath.solid import ToolSolid
-from rcsa_ident.workflows.path_milling import PathMilling
+from rcsa_ident.workflows.paths.milling import PathMilling
 
 #: Rows, places of the line that is drawn, triangles of the part, and points of the tool's outline that an answer has at most.
 MOST_ROWS, MOST_DRAWN, MOST_TRIANGLES, MOST_OUTLINE = 10_000, 10_000, 60_000, 60

@@ -208,7 +208,7 @@ def guarded(call: Callable[..., T], *arguments: Any) -> T:
     """Return the answer of a call; numbers that are valid each but have no finite answer together are bad input."""
     import numpy as np
 
-    from rcsa_ident.errors import InputError
+    from rcsa_ident.base.errors import InputError
 
     try:
         with np.errstate(all="ignore"):

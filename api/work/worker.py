@@ -13,7 +13,7 @@ from api.confinement import confine
 from api.log_lines import ids, telling
 from api.processes import limit, limit_memory
 from api.work.requests import TooLong
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 #: Time limit for the start of a process, including imports and compilation [s].
 _START = 300.0

@@ -10,7 +10,7 @@ from sphinx.application import Sphinx
 
 
 def write_schemas(app: Sphinx) -> None:
-    from rcsa_ident.io.schemas import SCHEMAS, schema_text
+    from rcsa_ident.io.settings.schemas import SCHEMAS, schema_text
 
     write(Path(app.srcdir) / "reference" / "schemas", {f"{name}.json": schema_text(name) for name in SCHEMAS})
 

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from rcsa_ident.processes import THREADS
+from rcsa_ident.front.processes import THREADS
 
 # before anything asks for numpy
 for _name in THREADS:

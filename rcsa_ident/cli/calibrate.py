@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.machining_setup import Campaign
+    from rcsa_ident.setup.machining_setup import Campaign
     from rcsa_ident.report.comparison import MeanForces
     from rcsa_ident.workflows.calibrate import Calibrated
 
@@ -66,11 +66,11 @@ def calibrate(
     from functools import partial
 
     from rcsa_ident.cutting.signal_fit import Dynamometer
-    from rcsa_ident.errors import positive
-    from rcsa_ident.io.dynamometer import write_workpiece
-    from rcsa_ident.io.recordings import read_cut
-    from rcsa_ident.io.setups import read_campaign
-    from rcsa_ident.machining_setup import Workpiece
+    from rcsa_ident.base.errors import positive
+    from rcsa_ident.io.settings.dynamometer import write_workpiece
+    from rcsa_ident.io.recordings.readers import read_cut
+    from rcsa_ident.io.settings.setups import read_campaign
+    from rcsa_ident.setup.machining_setup import Workpiece
     from rcsa_ident.workflows.calibrate import calibrate as run
 
     writable(out)
@@ -208,8 +208,8 @@ def materials(
     """List cutting coefficients from published sources, with what another cutter may be off."""
     from rcsa_ident.cutting.materials import material
     from rcsa_ident.cutting.materials import materials as library
-    from rcsa_ident.io.workpieces import workpiece_keys
-    from rcsa_ident.machining_setup import Workpiece
+    from rcsa_ident.io.settings.workpieces import workpiece_keys
+    from rcsa_ident.setup.machining_setup import Workpiece
 
     chosen = library() if name is None else (material(name),)
     if json_:

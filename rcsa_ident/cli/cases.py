@@ -15,10 +15,10 @@ from rcsa_ident.cli.options import CutOptions, SpeedOptions, takes_groups
 from rcsa_ident.cli.results import read_machine
 
 if TYPE_CHECKING:
-    from rcsa_ident.arrays import FloatArray
-    from rcsa_ident.io.cases import Case
+    from rcsa_ident.base.arrays import FloatArray
+    from rcsa_ident.io.settings.cases import Case
     from rcsa_ident.report.lobes import Panel
-    from rcsa_ident.stability.tested_cuts import Tally
+    from rcsa_ident.stability.labels.tested_cuts import Tally
     from rcsa_ident.workflows.tool_change import ToolChange
 
 
@@ -36,7 +36,7 @@ def cases(
     json_: Json = False,
 ) -> None:
     """Count tested cuts of several toolings and cuts beside the lobes, and draw all of them in one figure."""
-    from rcsa_ident.io.cases import read_cases
+    from rcsa_ident.io.settings.cases import read_cases
     from rcsa_ident.report.lobes import Judged, Panel, cases_figure, save_figure
     from rcsa_ident.report.summaries import tally_summary
     from rcsa_ident.workflows.tool_change import classify_tested_cuts

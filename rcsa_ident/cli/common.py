@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from rcsa_ident.errors import InputError, RcsaIdentError, no_cache
+from rcsa_ident.base.errors import InputError, RcsaIdentError, no_cache
 from rcsa_ident.io.unread_columns import left_aside, reading_tables
 
 if TYPE_CHECKING:

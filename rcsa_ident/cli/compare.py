@@ -9,7 +9,7 @@ import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile, ToolingFile
-from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
+from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,9 +50,9 @@ def compare(
 
     from rcsa_ident.cli.results import read_machine, tell
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.errors import InputError, positive
-    from rcsa_ident.io.hammer import labelled, read_hammer
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.base.errors import InputError, positive
+    from rcsa_ident.io.curves.hammer import labelled, read_hammer
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.compare import Place
     from rcsa_ident.workflows.compare import compare as run
 

@@ -7,29 +7,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcsa_ident.cli.options import CutOptions, DriveOptions, SpeedOptions, Stock, Strategy, TipOptions
-from rcsa_ident.errors import InputError
-from rcsa_ident.remarks import counted
-from rcsa_ident.units import from_rpm, inclusive
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import counted
+from rcsa_ident.base.units import from_rpm, inclusive
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.cutting.conditions import Engagement
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
     from rcsa_ident.cutting.stock import AskedEngagement
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.machine.machine import TipSource
-    from rcsa_ident.machining_setup import CutSpec, Tooling
+    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
     from rcsa_ident.workflows.tool_change import ToolChange
 
 
 def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = None, most: int = 1) -> tuple[TipSource, list[Tooling]]:
     """Return what takes the toolings, and these: RESULT.json (or its kin) TOOLING.toml ..., or with --modes or --frf one alone."""
     from rcsa_ident.cli.results import read_tip_source
-    from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.io.stickouts import read_stickouts
+    from rcsa_ident.io.settings.setups import read_tooling
+    from rcsa_ident.io.settings.stickouts import read_stickouts
     from rcsa_ident.machine.learnt_tip import LearntTip
     from rcsa_ident.machine.machine import Machine
 
@@ -66,7 +66,7 @@ def subjects_of(files: Sequence[Path], tip: TipOptions, stickouts: str | None = 
 
 def _known_tip(options: TipOptions) -> TipSource:
     """What stands in the place of a machine: a modal model of the tip, or tap tests of it."""
-    from rcsa_ident.io.modal_files import read_modes_files
+    from rcsa_ident.io.settings.modal_files import read_modes_files
     from rcsa_ident.machine.known_tip import KnownTip
 
     if options.modes:
@@ -78,7 +78,7 @@ def _known_tip(options: TipOptions) -> TipSource:
 def idle_tip(texts: Sequence[str], units: str | None = None, from_hz: float | None = None, corrections: Sequence[str] = ()) -> Receptance:
     """Return the tip's receptance from tap tests, each written as with --frf, and corrected as with --frf-correction."""
     from rcsa_ident.dynamics.passivity import correction_of
-    from rcsa_ident.io.frf_files import read_tapped_tip
+    from rcsa_ident.io.curves.frf_files import read_tapped_tip
 
     sources = [frf_source(text) for text in texts]
     for text in corrections:
@@ -94,7 +94,7 @@ def idle_tip(texts: Sequence[str], units: str | None = None, from_hz: float | No
 
 def frf_source(text: str) -> Any:
     """Return what a file, X=FILE or XY=FILE, each with or without #RECORD, asks to be read."""
-    from rcsa_ident.io.frf_files import Source
+    from rcsa_ident.io.curves.frf_files import Source
 
     axes, sign, name = text.partition("=")
     named = bool(sign) and 1 <= len(axes) <= 2 and set(axes.upper()) <= set("XYZ")
@@ -132,7 +132,7 @@ def share_of(percent: float, option: str, most: float, above: bool = False) -> f
 
 def cut_of(cut: CutOptions, speed_variation: str | None = None) -> CutSpec:
     """Return the cut that is asked about."""
-    from rcsa_ident.machining_setup import CutSpec
+    from rcsa_ident.setup.machining_setup import CutSpec
 
     given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}
     given |= {} if cut.krc is None else {"radial_ratio": cut.krc}
@@ -155,7 +155,7 @@ def _stock(cut: CutOptions) -> AskedEngagement:
     """How the cutter is engaged: by a map, by a block's sides, by angles, or by an immersion, which is a stepover to a shape."""
     from rcsa_ident.cutting.conditions import Block
     from rcsa_ident.cutting.stock import Immersion
-    from rcsa_ident.io.engagements import read_engagement_map
+    from rcsa_ident.io.settings.engagements import read_engagement_map
 
     angles, sides = cut.entry_deg is not None or cut.exit_deg is not None, cut.y_from_mm is not None or cut.y_to_mm is not None
     told = {"--engagement": cut.engagement is not None, "--y-from-mm": sides, "--entry-deg": angles}
@@ -239,7 +239,7 @@ def immersion_of(text: str) -> float:
 
 def feed_angle(text: str) -> float:
     """Return the feed direction [rad] of +X, -X, +Y, -Y or degrees."""
-    from rcsa_ident.io.cuts import FEED_DIRECTIONS
+    from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 
     if text.upper() in FEED_DIRECTIONS:
         return FEED_DIRECTIONS[text.upper()]
@@ -255,8 +255,8 @@ def feed_angle(text: str) -> float:
 def drive_of(options: DriveOptions) -> SpindleDrive:
     """Return what the spindle has."""
     from rcsa_ident.cutting.power import SpindleDrive
-    from rcsa_ident.errors import positive
-    from rcsa_ident.io.spindle_drives import read_spindle_drive
+    from rcsa_ident.base.errors import positive
+    from rcsa_ident.io.settings.spindle_drives import read_spindle_drive
 
     given = (
         ("--max-power-kw", options.max_power_kw, "kW", 1e3),

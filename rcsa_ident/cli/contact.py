@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_hz, to_hz
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz
 
 if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Dof
@@ -48,9 +48,9 @@ def contact(
     json_: Json = False,
 ) -> None:
     """Calibrate the distributed contact between tool and holder from tap tests of the assembly."""
-    from rcsa_ident.errors import positive
-    from rcsa_ident.io.hammer import write_calibrated_tooling
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.base.errors import positive
+    from rcsa_ident.io.curves.hammer import write_calibrated_tooling
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.contact import calibrate_contact
 
     writable(out)
@@ -84,8 +84,8 @@ def _taps(tooling: Path, texts: list[str], on: Path | None, low: float, high: fl
     import numpy as np
 
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io.hammer import labelled, read_hammer
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.curves.hammer import labelled, read_hammer
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.contact import TapTest
 
     last = np.inf if high is None else high
@@ -117,7 +117,7 @@ def _supports(path: Path) -> tuple[dict[Dof, Support], tuple[float, float]]:
     from rcsa_ident.workflows.contact import Support
 
     if path.suffix.lower() == ".csv":
-        from rcsa_ident.io.flanges import read_flange_machine
+        from rcsa_ident.io.curves.flanges import read_flange_machine
 
         known = read_flange_machine(path)
         tell(known, path)

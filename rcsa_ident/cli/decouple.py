@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_hz, to_hz
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,8 +53,8 @@ def decouple(
     """Take known tool-holders out of measured assemblies: what is left is the spindle's flange, rotations included."""
     import numpy as np
 
-    from rcsa_ident.errors import positive
-    from rcsa_ident.io.flanges import write_flange_csv
+    from rcsa_ident.base.errors import positive
+    from rcsa_ident.io.curves.flanges import write_flange_csv
     from rcsa_ident.workflows.decouple import flange_from_taps
 
     writable(out)
@@ -128,12 +128,12 @@ def axial(
 
     from rcsa_ident.cli.conditions import frf_source
     from rcsa_ident.cli.results import read_identified
-    from rcsa_ident.errors import positive
-    from rcsa_ident.io.axial_flanges import axial_to_json
-    from rcsa_ident.io.flanges import read_flange_machine, write_flange_machine
-    from rcsa_ident.io.frf_files import read_tap_tests
-    from rcsa_ident.io.results import write_result
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.base.errors import positive
+    from rcsa_ident.io.results.axial_flanges import axial_to_json
+    from rcsa_ident.io.curves.flanges import read_flange_machine, write_flange_machine
+    from rcsa_ident.io.curves.frf_files import read_tap_tests
+    from rcsa_ident.io.results.parts import write_result
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.decouple import axial_flange_from_tap
 
     measured = result.suffix.lower() == ".csv"
@@ -172,8 +172,8 @@ def _taps(texts: list[str], low: float, high: float) -> dict[Dof, list[FlangeTap
     import numpy as np
 
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io.hammer import read_hammer
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.curves.hammer import read_hammer
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.compare import Place
     from rcsa_ident.workflows.decouple import FlangeTap
 

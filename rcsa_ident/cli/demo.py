@@ -11,17 +11,17 @@ import typer
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, read_tests, result_of, search, warn_left_out
 from rcsa_ident.cli.processes import Processes
-from rcsa_ident.processes import Workers, workers
-from rcsa_ident.units import from_rpm, to_hz, to_rpm
+from rcsa_ident.front.processes import Workers, workers
+from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.identification.result import Identification
-    from rcsa_ident.machining_setup import Campaign, Tooling
+    from rcsa_ident.setup.machining_setup import Campaign, Tooling
     from rcsa_ident.report.html import ToolingPage
 
 #: Where predicted and true tooltip FRFs are compared [Hz].
@@ -55,7 +55,7 @@ def demo(
     afterwards; the identification never reads it.
     """
     from rcsa_ident.io.files import filling, write_text
-    from rcsa_ident.io.results import write_result
+    from rcsa_ident.io.results.parts import write_result
     from rcsa_ident.report.html import report_html
     from rcsa_ident.workflows.identify import mode_deviations
 
@@ -98,7 +98,7 @@ def _data(given: Path | None, out: Path, pool: Workers, stages: Stages) -> tuple
     if given is not None or SAMPLES.is_dir():
         folder = SAMPLES if given is None else given
         return folder, sorted((folder.resolve().parent / "machines" / "toolings").glob("*.toml"))
-    from rcsa_ident.samples import make_sample_campaign, sample_toolings
+    from rcsa_ident.front.samples import make_sample_campaign, sample_toolings
 
     with stages.stage("sample campaign") as progress:
         folder = make_sample_campaign(out / "sample_runs", progress=progress, mapper=pool.map)
@@ -109,7 +109,7 @@ def _data(given: Path | None, out: Path, pool: Workers, stages: Stages) -> tuple
 
 def _further_toolings(campaign: Campaign, paths: list[Path]) -> dict[str, Tooling]:
     """Toolings that the campaign has not cut with."""
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.setups import read_tooling
 
     read = [read_tooling(path) for path in paths]
     return {each.name: each for each in read if each.name not in campaign.toolings}
@@ -125,10 +125,10 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     import numpy as np
 
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io.curves import write_tip_csv
-    from rcsa_ident.io.lobes import write_lobes
+    from rcsa_ident.io.curves.tips import write_tip_csv
+    from rcsa_ident.io.curves.lobes import write_lobes
     from rcsa_ident.machine.known_tip import measured_tip
-    from rcsa_ident.machining_setup import CutSpec
+    from rcsa_ident.setup.machining_setup import CutSpec
     from rcsa_ident.report.html import ToolingPage
     from rcsa_ident.report.summaries import entries_of
     from rcsa_ident.stability.lobes import stability_lobes
@@ -182,7 +182,7 @@ def _truth(
     """The true FRF at the same frequencies, the relative difference and the band's coverage, where the truth is known."""
     import numpy as np
 
-    from rcsa_ident.io.curves import read_frf_csv
+    from rcsa_ident.io.curves.tips import read_frf_csv
 
     if not path.is_file():
         return None, {}, {}

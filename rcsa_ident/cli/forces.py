@@ -11,12 +11,12 @@ import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.options import Strategy
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import Machine
-    from rcsa_ident.machining_setup import Tooling
+    from rcsa_ident.setup.machining_setup import Tooling
     from rcsa_ident.observer.wear import WearIndicators
     from rcsa_ident.signals.recording import Sensor
     from rcsa_ident.workflows.estimate_forces import MonitoredCut
@@ -84,9 +84,9 @@ def forces(
 ) -> None:
     """Estimate the cutting forces of a recording from the flange's vibration."""
     from rcsa_ident.cli.results import read_machine, tell
-    from rcsa_ident.io.forces import write_forces
-    from rcsa_ident.io.recordings import read_recording
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.curves.forces import write_forces
+    from rcsa_ident.io.recordings.readers import read_recording
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.observer.force import restore_mean_force
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.estimate_forces import observe
@@ -159,7 +159,7 @@ def forces(
 def _sensors(machine: Machine, campaign: Path | None, result: Path) -> tuple[Sensor, ...]:
     """The sensors of the recording: those of a campaign, else those that the machine was identified with."""
     from rcsa_ident.identification.machine import IdentifiedMachine
-    from rcsa_ident.io.setups import read_campaign
+    from rcsa_ident.io.settings.setups import read_campaign
 
     if campaign is not None:
         return read_campaign(campaign).sensors

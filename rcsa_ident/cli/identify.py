@@ -23,21 +23,21 @@ from rcsa_ident.cli.common import (
     writable,
 )
 from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.status import Status
-from rcsa_ident.processes import Workers
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.front.processes import Workers
+from rcsa_ident.base.units import to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.hammer_lines import HammerLines
     from rcsa_ident.identification.method import Method as IdentificationMethod
     from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
     from rcsa_ident.identification.result import Identification
-    from rcsa_ident.machining_setup import Campaign
+    from rcsa_ident.setup.machining_setup import Campaign
     from rcsa_ident.signals.measurement import Reading
     from rcsa_ident.workflows.speed_bands import SpeedBand
 
@@ -129,7 +129,7 @@ def identify(
     its reasons say why.
     """
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.results import write_result
+    from rcsa_ident.io.results.parts import write_result
 
     writable(out)
     if report is not None:
@@ -180,8 +180,8 @@ def identify(
 
 def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaign, list[Reading]]:
     """Return a campaign with the verdict on each of its recordings."""
-    from rcsa_ident.io.recordings import read_cut
-    from rcsa_ident.io.setups import read_campaign
+    from rcsa_ident.io.recordings.readers import read_cut
+    from rcsa_ident.io.settings.setups import read_campaign
     from rcsa_ident.workflows.identify import judge
 
     # a worker elsewhere stands in another folder
@@ -193,7 +193,7 @@ def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaig
 
 def read_tests(campaign: Campaign) -> tuple[HammerLines, ...]:
     """Return the lines of a campaign's hammer tests."""
-    from rcsa_ident.io.hammer import read_hammer_test
+    from rcsa_ident.io.curves.hammer import read_hammer_test
     from rcsa_ident.workflows.identify import hammer_lines
 
     return hammer_lines(campaign, read_hammer_test)
@@ -207,8 +207,8 @@ def read_start(path: Path) -> Mapping[Dof, Posterior | PlaneUnknowns]:
     InputError
         If the file holds none, as with the published method.
     """
-    from rcsa_ident.io.identifications import machine_from_json
-    from rcsa_ident.io.results import read_result
+    from rcsa_ident.io.results.identifications import machine_from_json
+    from rcsa_ident.io.results.parts import read_result
 
     try:
         return machine_from_json(read_result(path), str(path)).starts()
@@ -264,7 +264,7 @@ def result_of(
     bands: Sequence[SpeedBand] = (),
 ) -> dict[str, Any]:
     """Return the content of RESULT.json."""
-    from rcsa_ident.io.identifications import identification_to_json, speed_band_to_json
+    from rcsa_ident.io.results.identifications import identification_to_json, speed_band_to_json
     from rcsa_ident.workflows.identify import left_out, mode_deviations
 
     data = identification_to_json(found, campaign, left_out(readings), deviations)

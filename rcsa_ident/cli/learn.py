@@ -11,16 +11,16 @@ from rcsa_ident.cli.common import NOT_CONVERGED, Json, Seed, Stages, answers, em
 from rcsa_ident.cli.conditions import cut_of, idle_tip, share_of
 from rcsa_ident.cli.options import CutOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.cli.processes import Processes
-from rcsa_ident.errors import InputError
-from rcsa_ident.processes import workers
-from rcsa_ident.remarks import counted
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.front.processes import workers
+from rcsa_ident.base.remarks import counted
 from rcsa_ident.stability.methods import MethodName
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rcsa_ident.machine.learnt_tip import LearntTip
-    from rcsa_ident.machining_setup import CutSpec, Tooling
+    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
     from rcsa_ident.workflows.learn_from_cuts import Believed
 
 
@@ -94,9 +94,9 @@ def learn(
     contradict is named and not written, exit code 3.
     """
     from rcsa_ident.cli.learn_toolings import New, learn_from_campaign, learn_from_taps
-    from rcsa_ident.io.learnt_tips import believed as told
-    from rcsa_ident.io.learnt_tips import write_learnt_tip
-    from rcsa_ident.io.tested_cuts import read_tested_cuts
+    from rcsa_ident.io.results.learnt_tips import believed as told
+    from rcsa_ident.io.results.learnt_tips import write_learnt_tip
+    from rcsa_ident.io.settings.tested_cuts import read_tested_cuts
     from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts
 
@@ -154,8 +154,8 @@ def believed_of(
 ) -> tuple[Believed, Tooling, LearntTip | None]:
     """Return what is believed before further labels, the tooling, and the tip that earlier labels have taught, if there is one."""
     from rcsa_ident.cli.results import read_tip_source
-    from rcsa_ident.io.modal_files import read_modes_files
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.modal_files import read_modes_files
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.machine.learnt_tip import LearntTip
     from rcsa_ident.workflows.learn_from_cuts import Believed, believed_of_learnt, believed_of_machine, believed_of_tap_test
 

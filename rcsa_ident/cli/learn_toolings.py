@@ -12,8 +12,8 @@ import typer
 from rcsa_ident.cli.common import NOT_CONVERGED, Stages, emit, say, warn, writable
 from rcsa_ident.cli.conditions import frf_source
 from rcsa_ident.cli.identify import read_and_judge, read_tests
-from rcsa_ident.errors import InputError
-from rcsa_ident.processes import workers
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.front.processes import workers
 
 #: Numbers from which on an exponent is easier to read.
 LARGE = 1e4
@@ -21,7 +21,7 @@ LARGE = 1e4
 if TYPE_CHECKING:
     from rcsa_ident.identification.hammer_lines import HammerLines
     from rcsa_ident.identification.machine import IdentifiedMachine
-    from rcsa_ident.machining_setup import Campaign
+    from rcsa_ident.setup.machining_setup import Campaign
     from rcsa_ident.signals.measurement import Reading
     from rcsa_ident.workflows.learn_toolings import LearntToolings
 
@@ -47,7 +47,7 @@ class New:
 
 def learn_from_campaign(result: Path, campaign_dir: Path, new: New, processes: int | None) -> None:
     """Learn toolings that are new to a machine from a campaign's cuts and hammer tests of the tip."""
-    from rcsa_ident.io.setups import tooling_file_names
+    from rcsa_ident.io.settings.setups import tooling_file_names
 
     stages, known = Stages(quiet=new.json), _known(result, new)
     with workers(processes) as pool:
@@ -59,8 +59,8 @@ def learn_from_campaign(result: Path, campaign_dir: Path, new: New, processes: i
 
 def learn_from_taps(result: Path, tooling_file: Path, taps: Sequence[str], units: str | None, sensor_mass: float, new: New) -> None:
     """Learn a tooling that is new to a machine from hammer tests of its tip, each written as with --frf; the sensor's mass in kg."""
-    from rcsa_ident.io.frf_files import read_tap_tests
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.curves.frf_files import read_tap_tests
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.identify import hammer_lines
     from rcsa_ident.workflows.learn_toolings import campaign_of_taps
 
@@ -107,9 +107,9 @@ def _learn(
 ) -> None:
     """Learn, write and tell: each tooling under its own file name; exit code 3 where something contradicts."""
     from rcsa_ident.cli.results import tell
-    from rcsa_ident.io.results import write_result
-    from rcsa_ident.io.taught_results import recordings_of, refuse_taught, taught_result
-    from rcsa_ident.io.toolings import write_tooling
+    from rcsa_ident.io.results.parts import write_result
+    from rcsa_ident.io.results.updated_results import recordings_of, refuse_taught, taught_result
+    from rcsa_ident.io.settings.toolings import write_tooling
     from rcsa_ident.workflows.identify import left_out
     from rcsa_ident.workflows.learn_toolings import learn_toolings
 

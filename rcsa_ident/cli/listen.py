@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, writable
-from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_rpm
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm
 
 
 class Listened(StrEnum):
@@ -39,7 +39,7 @@ def listen(
     json_: Json = False,
 ) -> None:
     """Tell from a recording alone: the spindle's speed, teeth, whether it cuts stably or chatters, and which speeds to try."""
-    from rcsa_ident.io.open_recording import open_recording
+    from rcsa_ident.io.recordings.open_recording import open_recording
     from rcsa_ident.report.summaries import listening_row
     from rcsa_ident.signals.recording import Quantity
     from rcsa_ident.workflows.listen import listen_to

@@ -13,13 +13,13 @@ from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writab
 from rcsa_ident.cli.conditions import change_of, cut_of, share_of, subjects_of
 from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.cli.results import read_machine
-from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_hz, from_rpm, inclusive, to_hz, to_rpm
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, from_rpm, inclusive, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Coordinate
     from rcsa_ident.dynamics.uncertain import UncertainReceptance
     from rcsa_ident.machine.machine import Machine
@@ -65,7 +65,7 @@ def tooltip(
     json_: Json = False,
 ) -> None:
     """Predict the tooltip FRF of any tooling on the identified machine: the tool's own, whatever gives way on the workpiece's side."""
-    from rcsa_ident.errors import positive
+    from rcsa_ident.base.errors import positive
 
     writable(out)
     check_plot(plot)
@@ -91,8 +91,8 @@ def tell_tooltip(
     json_: bool = False,
 ) -> None:
     """Write the tooltip FRF of a tooling on a machine at frequencies [Hz], draw it, and print its peaks."""
-    from rcsa_ident.io.curves import write_tip_csv
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.curves.tips import write_tip_csv
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.tool_change import tooltip as ask
 
     tool = read_tooling(tooling)
@@ -194,8 +194,8 @@ def tell_lobes(
     json_: bool = False,
 ) -> None:
     """Write and print the stability lobes of what is asked about, and what is recommended; options as of `lobes`, lengths in metres."""
-    from rcsa_ident.io.lobes import write_lobes, write_map
-    from rcsa_ident.io.tested_cuts import read_tested_cuts, write_tests
+    from rcsa_ident.io.curves.lobes import write_lobes, write_map
+    from rcsa_ident.io.settings.tested_cuts import read_tested_cuts, write_tests
     from rcsa_ident.workflows.advise import advise
     from rcsa_ident.workflows.tool_change import map_of, probabilities_stable, surface_of
 

@@ -9,7 +9,7 @@ import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say
 from rcsa_ident.cli.processes import Processes
-from rcsa_ident.processes import workers
+from rcsa_ident.front.processes import workers
 
 
 @answers
@@ -21,7 +21,7 @@ def simulate(
     json_: Json = False,
 ) -> None:
     """Record a campaign on the virtual machine."""
-    from rcsa_ident.samples import simulate_campaign as run
+    from rcsa_ident.front.samples import simulate_campaign as run
 
     stages = Stages(quiet=json_)
     with stages.stage("cuts") as progress, workers(processes, ("rcsa_ident.workflows.simulate",)) as pool:
@@ -36,10 +36,10 @@ def simulate(
 @answers
 def warm(processes: Processes = None, json_: Json = False) -> None:
     """Compile the numerical kernels once and cache them; the first command is then as fast as any other."""
-    from rcsa_ident.workflows.compile_kernels import FIRST, STEPS, TOGETHER, compile_steps
+    from rcsa_ident.front.compile_kernels import FIRST, STEPS, TOGETHER, compile_steps
 
     stages = Stages(quiet=json_)
-    with stages.stage("kernels") as progress, workers(processes, ("rcsa_ident.workflows.compile_kernels",)) as pool:
+    with stages.stage("kernels") as progress, workers(processes, ("rcsa_ident.front.compile_kernels",)) as pool:
         seconds = compile_steps(FIRST)
         for taken in pool.map(compile_steps, TOGETHER):
             seconds |= taken

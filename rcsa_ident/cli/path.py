@@ -10,10 +10,10 @@ import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ToolingFile, check_plot
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.toolpath.dexel import Surface
 
 PathFile = Annotated[Path, typer.Argument(help="PATH.nc (G-code) or PATH.csv of the tool's tip.", show_default=False)]
@@ -49,11 +49,11 @@ def remove(
     json_: Json = False,
 ) -> None:
     """Take out of the stock what the tool sweeps along the path, and tell where its edges are in the material."""
-    from rcsa_ident.io.engagements import write_engagement
-    from rcsa_ident.io.meshes import check_mesh_name, write_mesh
-    from rcsa_ident.io.paths import read_tool_path
-    from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.path_removal import field_of, remove_along
+    from rcsa_ident.io.settings.engagements import write_engagement
+    from rcsa_ident.io.paths.meshes import check_mesh_name, write_mesh
+    from rcsa_ident.io.paths.tool_paths import read_tool_path
+    from rcsa_ident.io.settings.setups import read_tooling
+    from rcsa_ident.workflows.paths.removal import field_of, remove_along
 
     writable(out)
     check_plot(plot)
@@ -104,7 +104,7 @@ def remove(
 
 def stock_of(text: str) -> tuple[tuple[FloatArray, FloatArray] | None, Surface | None]:
     """Return a block by its corners [m] or a surface, whichever an option names."""
-    from rcsa_ident.io.meshes import read_mesh
+    from rcsa_ident.io.paths.meshes import read_mesh
 
     if Path(text).suffix and not _numbers(text):
         return None, read_mesh(text)

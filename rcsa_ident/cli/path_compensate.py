@@ -13,10 +13,10 @@ import typer
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ToolingFile
 from rcsa_ident.cli.robot import is_robot
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.errors import InputError, positive
 
 if TYPE_CHECKING:
-    from rcsa_ident.machining_setup import Tooling
+    from rcsa_ident.setup.machining_setup import Tooling
     from rcsa_ident.toolpath.blending import Controller
     from rcsa_ident.toolpath.compensation import CompensatedPath
     from rcsa_ident.toolpath.deviation import Deviation
@@ -106,10 +106,10 @@ def compensate(
     json_: Json = False,
 ) -> None:
     """Correct a path so that the tool cuts where it should though arm or machine give way, and tell what is left and where it ends."""
-    from rcsa_ident.io.gcode import kept_words
-    from rcsa_ident.io.path_forces import write_joints
-    from rcsa_ident.io.paths import PROGRAMS, check_path_name, read_tool_path, write_tool_path
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.paths.gcode import kept_words
+    from rcsa_ident.io.paths.path_forces import write_joints
+    from rcsa_ident.io.paths.tool_paths import PROGRAMS, check_path_name, read_tool_path, write_tool_path
+    from rcsa_ident.io.settings.setups import read_tooling
 
     writable(out)
     check_path_name(out)
@@ -170,7 +170,7 @@ def _controller(blend: float, lag: float | None) -> Controller:
 def _forces(text: str, path: ToolPath, axes: ForceAxes) -> ForceAlongPath:
     import numpy as np
 
-    from rcsa_ident.io.path_forces import read_path_forces
+    from rcsa_ident.io.paths.path_forces import read_path_forces
     from rcsa_ident.toolpath.forces import on_all_moves
 
     if text.lower().endswith(".csv"):
@@ -211,7 +211,7 @@ def _on_arm(
     import numpy as np
 
     from rcsa_ident.cli.robot import _angles, _arm, _found
-    from rcsa_ident.workflows.robot_path import IdealForce, Mirror, RobotPath, compensate
+    from rcsa_ident.workflows.paths.robot import IdealForce, Mirror, RobotPath, compensate
 
     posterior = _found(machine, joints_only)
     robot = _arm(machine, joints_only) if posterior is None else posterior.arm
@@ -235,7 +235,7 @@ def _on_machine(
     import numpy as np
 
     from rcsa_ident.cli.results import read_machine
-    from rcsa_ident.workflows.machine_path import compensate_machine, compliance_at_rest
+    from rcsa_ident.workflows.paths.machine import compensate_machine, compliance_at_rest
 
     known = read_machine(machine)
     compliance, others = compliance_at_rest(known, tool, draws, np.random.default_rng(seed))

@@ -15,18 +15,18 @@ from rcsa_ident.cli.lobes import check_plot
 from rcsa_ident.cli.options import TipOptions, takes_groups
 from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
 from rcsa_ident.cli.robot import is_robot, posed_robot
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.remarks import counted
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import counted
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.units import from_rpm
+from rcsa_ident.base.units import from_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import TipSource
-    from rcsa_ident.machining_setup import Tooling
+    from rcsa_ident.setup.machining_setup import Tooling
     from rcsa_ident.toolpath.path import ToolPath
-    from rcsa_ident.workflows.path_milling import PathMilling
-    from rcsa_ident.workflows.path_removal import PathRemoval
-    from rcsa_ident.workflows.path_stability import CutsAlong
+    from rcsa_ident.workflows.paths.milling import PathMilling
+    from rcsa_ident.workflows.paths.removal import PathRemoval
+    from rcsa_ident.workflows.paths.stability import CutsAlong
     from rcsa_ident.workflows.tool_change import ToolChange
 
 Files = Annotated[
@@ -79,9 +79,9 @@ def stability(
     """Tell on every move of a path how far the cut is from chatter, its force, how the tip moves, and where it leaves the wall."""
     import numpy as np
 
-    from rcsa_ident.io.path_tables import stability_columns, write_columns
-    from rcsa_ident.workflows.path_removal import field_of, remove_along
-    from rcsa_ident.workflows.path_stability import cuts_along, described, stations_along
+    from rcsa_ident.io.paths.path_tables import stability_columns, write_columns
+    from rcsa_ident.workflows.paths.removal import field_of, remove_along
+    from rcsa_ident.workflows.paths.stability import cuts_along, described, stations_along
 
     writable(out)
     check_plot(plot)
@@ -128,9 +128,9 @@ def mill(
     json_: Json = False,
 ) -> None:
     """Mill along a path in time: chips, forces and vibrations instant by instant, and the walls that they leave."""
-    from rcsa_ident.io.path_tables import milling_columns, write_columns
-    from rcsa_ident.workflows.path_milling import mill_path
-    from rcsa_ident.workflows.path_removal import field_of
+    from rcsa_ident.io.paths.path_tables import milling_columns, write_columns
+    from rcsa_ident.workflows.paths.milling import mill_path
+    from rcsa_ident.workflows.paths.removal import field_of
 
     writable(out)
     if surface is not None:
@@ -159,8 +159,8 @@ def mill(
 
 def _subjects(files: list[Path], tip: TipOptions, posture: str | None) -> tuple[TipSource, Tooling, ToolPath]:
     """The machine, the tooling and the path that a command line names."""
-    from rcsa_ident.io.paths import read_tool_path
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.paths.tool_paths import read_tool_path
+    from rcsa_ident.io.settings.setups import read_tooling
 
     if len(files) < 2:
         raise InputError(
@@ -180,7 +180,7 @@ def _subjects(files: list[Path], tip: TipOptions, posture: str | None) -> tuple[
 def _change(machine: TipSource, tooling: Tooling, cut: PathCutOptions, method: MethodName, bands: bool) -> ToolChange:
     import numpy as np
 
-    from rcsa_ident.machining_setup import CutSpec
+    from rcsa_ident.setup.machining_setup import CutSpec
     from rcsa_ident.stability.lobes import DRAWS
     from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.workflows.tool_change import ToolChange
@@ -247,7 +247,7 @@ def _plots(removal: PathRemoval, tooling: Tooling, found: CutsAlong, margin: Pat
     if margin is None and error is None:
         return
     from rcsa_ident.report.part import save_coloured_part
-    from rcsa_ident.workflows.path_removal import solid_of
+    from rcsa_ident.workflows.paths.removal import solid_of
 
     for file, values, label, limits in (
         (margin, found.margin_low, "margin to chatter", (0.0, 2.0)),

@@ -13,8 +13,8 @@ import typer
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import engagement, feed_angle
 from rcsa_ident.cli.options import Strategy
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.units import from_rpm, to_rpm
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.units import from_rpm, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -105,7 +105,7 @@ def plan(
     """Choose the stable cuts that tell most about the tooltips that are wanted, and say what they will be good for."""
     from rcsa_ident.cli.results import read_identified, tell
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.plan import CutConstraints, alternating, plan_cuts
     from rcsa_ident.workflows.plan_passes import plan_passes
 
@@ -155,7 +155,7 @@ def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, s
     from rich.table import Table
 
     from rcsa_ident.cli.tables import show
-    from rcsa_ident.io.cuts import cut_keys
+    from rcsa_ident.io.settings.cuts import cut_keys
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.toml_text import toml_of
 
@@ -189,7 +189,7 @@ def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, s
 
 def plan_text(planned: PlannedCuts) -> str:
     """Return the cuts as a campaign file has them; the recordings are named, not yet made."""
-    from rcsa_ident.io.cuts import cut_keys
+    from rcsa_ident.io.settings.cuts import cut_keys
     from rcsa_ident.io.toml_text import toml_of
 
     cuts = [cut_keys(name, cut.tooling, cut.conditions) for name, cut in zip(_names(planned), planned.cuts, strict=True)]
@@ -241,7 +241,7 @@ def _coefficients(data: dict[str, Any], where: str) -> CuttingCoefficients:
 
     from rcsa_ident.cutting.force import SLOPES
     from rcsa_ident.io.validated_table import Table
-    from rcsa_ident.io.workpieces import workpiece_of
+    from rcsa_ident.io.settings.workpieces import workpiece_of
 
     given = workpiece_of(Table(data, where).table("workpiece")).coefficients
     found = data.get("coefficients", {})
@@ -267,8 +267,8 @@ def _noise_of(folder: Path) -> float:
     """Noise of a displacement line in a few cuts of a campaign [m]."""
     from functools import partial
 
-    from rcsa_ident.io.recordings import read_cut
-    from rcsa_ident.io.setups import read_campaign
+    from rcsa_ident.io.recordings.readers import read_cut
+    from rcsa_ident.io.settings.setups import read_campaign
     from rcsa_ident.workflows.identify import judge_cut
     from rcsa_ident.workflows.plan import line_noise
 
@@ -279,7 +279,7 @@ def _noise_of(folder: Path) -> float:
 
 
 def _direction(angle: float) -> str | float:
-    from rcsa_ident.io.cuts import feed_direction_of
+    from rcsa_ident.io.settings.cuts import feed_direction_of
 
     found = feed_direction_of(angle)
     return found if isinstance(found, str) else float(f"{found:.9g}")

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 def read_machine(path: Path) -> Machine:
     """Return the machine of a RESULT.json or of a FLANGE.csv."""
-    from rcsa_ident.io.flanges import read_flange_machine
+    from rcsa_ident.io.curves.flanges import read_flange_machine
 
     return read_flange_machine(path) if path.suffix.lower() == ".csv" else read_identified(path)[0]
 
 
 def read_tip_source(path: Path) -> TipSource:
     """Return what the tip of a tooling is asked of: the machine of RESULT.json or FLANGE.csv, or a tip that labelled cuts have taught."""
-    from rcsa_ident.io.learnt_tips import is_learnt_tip, learnt_tip_of
-    from rcsa_ident.io.results import read_json
+    from rcsa_ident.io.results.learnt_tips import is_learnt_tip, learnt_tip_of
+    from rcsa_ident.io.results.parts import read_json
 
     if path.suffix.lower() != ".csv":
         data = read_json(path, "result")
@@ -33,8 +33,8 @@ def read_tip_source(path: Path) -> TipSource:
 
 def read_identified(path: Path) -> tuple[IdentifiedMachine, dict[str, Any]]:
     """Return the machine of a result file beside the file's content."""
-    from rcsa_ident.io.identifications import machine_from_json
-    from rcsa_ident.io.results import read_result
+    from rcsa_ident.io.results.identifications import machine_from_json
+    from rcsa_ident.io.results.parts import read_result
 
     data = read_result(path)
     return machine_from_json(data, str(path)), data

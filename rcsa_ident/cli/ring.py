@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 
 @answers
@@ -31,9 +31,9 @@ def ring(
 ) -> None:
     """Learn what a drawing does not tell from the ring of the tooling: hang it on a string, tap it, hold a phone beside it."""
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.open_recording import open_recording
-    from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.io.toolings import tooling_keys, tooling_text
+    from rcsa_ident.io.recordings.open_recording import open_recording
+    from rcsa_ident.io.settings.setups import read_tooling
+    from rcsa_ident.io.settings.toolings import tooling_keys, tooling_text
     from rcsa_ident.report.ring_rows import ring_row, sentences
     from rcsa_ident.workflows.ring import ring_tooling
 

@@ -13,12 +13,12 @@ from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writab
 from rcsa_ident.cli.conditions import change_of, cut_of
 from rcsa_ident.cli.lobes import Plot, ToolingFile, check_plot, tell_lobes, tell_tooltip
 from rcsa_ident.cli.options import CutOptions, SpeedOptions, takes_groups
-from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_hz, inclusive, to_hz, to_rpm
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, inclusive, to_hz, to_rpm
 
 if TYPE_CHECKING:
-    from rcsa_ident.arrays import FloatArray
-    from rcsa_ident.identification.posed.posterior import RobotPosterior
+    from rcsa_ident.base.arrays import FloatArray
+    from rcsa_ident.identification.arm.posterior import RobotPosterior
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
 
@@ -119,7 +119,7 @@ def lobes(
     json_: Json = False,
 ) -> None:
     """Compute stability lobes of a tooling on an arm at a posture; --feed-direction turns the feed from the tool's x."""
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.setups import read_tooling
 
     writable(out)
     check_plot(plot)
@@ -156,8 +156,8 @@ def map_(
     """Compute the stability limit at every place of a path and every speed: where on a part an arm may cut how deep."""
     import numpy as np
 
-    from rcsa_ident.io.paths import read_tool_path, write_limits_along
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.paths.tool_paths import read_tool_path, write_limits_along
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.robot_postures import following, limits_along
 
     writable(out)
@@ -194,7 +194,7 @@ def map_(
 
 
 def _arm(path: Path, joints_only: bool) -> FlexibleRobot:
-    from rcsa_ident.io.robots import read_robot
+    from rcsa_ident.io.settings.robots import read_robot
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
 
     found = _found(path, joints_only)
@@ -205,7 +205,7 @@ def _found(path: Path, joints_only: bool) -> RobotPosterior | None:
     """What cuts have told of a robot, where the file is RESULT.json."""
     if path.suffix.lower() != ".json":
         return None
-    from rcsa_ident.io.robot_results import read_robot_result
+    from rcsa_ident.io.results.robot_results import read_robot_result
 
     if joints_only:
         raise InputError("--joints-only", str(path), "ROBOT.toml: cuts have told all springs together")
@@ -214,8 +214,8 @@ def _found(path: Path, joints_only: bool) -> RobotPosterior | None:
 
 def is_robot(path: Path) -> bool:
     """Return whether a file describes an arm: ROBOT.toml, or RESULT.json of one."""
-    from rcsa_ident.io.results import read_json
-    from rcsa_ident.io.robot_results import KIND
+    from rcsa_ident.io.results.parts import read_json
+    from rcsa_ident.io.results.robot_results import KIND
 
     kind = path.suffix.lower()
     return kind == ".toml" or (kind == ".json" and read_json(path, "machine").get("kind") == KIND)

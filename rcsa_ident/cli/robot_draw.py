@@ -9,10 +9,10 @@ import typer
 
 from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 from rcsa_ident.cli.robot import Posture, RobotFile, _angles, _arm
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
 
 
 @answers
@@ -41,7 +41,7 @@ def draw(
     import numpy as np
 
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.report.robot_drawing import arm_svg
 
     writable(out)
@@ -51,7 +51,7 @@ def draw(
     places: FloatArray | None = None
     ends: list[FloatArray] = []
     if path is not None:
-        from rcsa_ident.io.paths import read_tool_path
+        from rcsa_ident.io.paths.tool_paths import read_tool_path
         from rcsa_ident.workflows.robot_postures import following
 
         if assembly is None:

@@ -13,7 +13,7 @@ from rcsa_ident.cli.common import NOT_CONVERGED, Json, Seed, Stages, answers, em
 from rcsa_ident.cli.identify import read_and_judge
 from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.cli.robot import RobotFile
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.status import Status
 
 
@@ -54,7 +54,7 @@ def identify(
     place of ROBOT.toml in `tip`, `lobes`, `map` and `check` then, at any posture, with bands. A joint whose motions do not tell keeps
     the file's stiffness; static tests tell the springs across the axes and the play, too.
     """
-    from rcsa_ident.io.robot_static import is_static
+    from rcsa_ident.io.settings.robot_static import is_static
 
     writable(out)
     folders = [path for path in records if path.is_dir()]
@@ -74,8 +74,8 @@ def identify(
 def _from_cuts(robot: Path, folder: Path, out: Path, seed: int, processes: int | None, dask: str | None, json_: bool) -> None:
     """What stable cuts at several postures tell."""
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.robot_results import robot_result_to_json, write_robot_result
-    from rcsa_ident.io.robots import read_robot, robot_keys
+    from rcsa_ident.io.results.robot_results import robot_result_to_json, write_robot_result
+    from rcsa_ident.io.settings.robots import read_robot, robot_keys
     from rcsa_ident.io.toml_text import toml_of
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.workflows.identify import left_out
@@ -119,10 +119,10 @@ def _from_encoders(robot: Path, records: Sequence[Path], out: Path, check: Seque
     """What motions tell, with encoders on both sides of the gears."""
     import numpy as np
 
-    from rcsa_ident.identification.robot_joints import fit_joints
+    from rcsa_ident.identification.arm.joints import fit_joints
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.robot_records import read_joint_record
-    from rcsa_ident.io.robots import read_robot, robot_keys
+    from rcsa_ident.io.recordings.robot_records import read_joint_record
+    from rcsa_ident.io.settings.robots import read_robot, robot_keys
     from rcsa_ident.io.toml_text import toml_of
 
     arm = read_robot(robot)
@@ -169,10 +169,10 @@ def _from_encoders(robot: Path, records: Sequence[Path], out: Path, check: Seque
 
 def _from_tests(robot: Path, records: Sequence[Path], out: Path, check: Sequence[Path], json_: bool) -> None:
     """What forces tell that push the standing arm."""
-    from rcsa_ident.identification.robot_static import fit_static
+    from rcsa_ident.identification.arm.static import fit_static
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.robot_static import read_static_tests
-    from rcsa_ident.io.robots import read_robot, robot_keys
+    from rcsa_ident.io.settings.robot_static import read_static_tests
+    from rcsa_ident.io.settings.robots import read_robot, robot_keys
     from rcsa_ident.io.toml_text import toml_of
 
     arm = read_robot(robot)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 
 @answers
@@ -41,9 +41,9 @@ def import_(
     `robot identify` finds it from records.
     """
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.robots import robot_keys
+    from rcsa_ident.io.settings.robots import robot_keys
     from rcsa_ident.io.toml_text import toml_of
-    from rcsa_ident.io.urdf import read_urdf
+    from rcsa_ident.io.settings.urdf import read_urdf
 
     writable(out)
     springs = _numbers(stiffness, "--stiffness-nm-per-rad", 1e-300)

@@ -11,10 +11,10 @@ import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.robot import RobotFile
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
 
 #: Share of what is believed that a doubt keeps where nothing tells of it.
 _UNTOLD = 0.95
@@ -66,9 +66,9 @@ def plan(
     """Choose the postures at which tests tell most of an arm: the smallest volume of what is left open (D-optimal)."""
     import numpy as np
 
-    from rcsa_ident.identification import robot_design
-    from rcsa_ident.io.postures import read_postures, write_postures
-    from rcsa_ident.io.robots import read_robot
+    from rcsa_ident.identification.arm import design as robot_design
+    from rcsa_ident.io.settings.postures import read_postures, write_postures
+    from rcsa_ident.io.settings.robots import read_robot
     from rcsa_ident.machine.robot.kinematics import tool_point_at
 
     writable(out)

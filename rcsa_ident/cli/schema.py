@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rcsa_ident.cli.common import Json, answers, emit, say, writable
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 
 @answers
@@ -24,7 +24,7 @@ def schema(
     Name it in the first line of the file: #:schema SCHEMA.json
     """
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.schemas import SCHEMAS, schema_of, schema_text
+    from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of, schema_text
 
     if name not in SCHEMAS:
         raise InputError("name", name, f"one of {', '.join(SCHEMAS)}")

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
-from rcsa_ident.errors import InputError, non_negative
-from rcsa_ident.units import to_hz
+from rcsa_ident.base.errors import InputError, non_negative
+from rcsa_ident.base.units import to_hz
 
 
 class Response(StrEnum):
@@ -60,8 +60,8 @@ def tap(
     json_: Json = False,
 ) -> None:
     """Average hits of a hammer to a receptance; double hits, overloads and others that do not fit are left out and named."""
-    from rcsa_ident.io.exports import TAP_SUFFIXES, write_tap
-    from rcsa_ident.io.open_recording import open_recording
+    from rcsa_ident.io.curves.exports import TAP_SUFFIXES, write_tap
+    from rcsa_ident.io.recordings.open_recording import open_recording
     from rcsa_ident.report.summaries import tap_row
     from rcsa_ident.signals.tap import HitEstimator
     from rcsa_ident.workflows.tap import tap_recordings

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import BAD_INPUT, Json, answers, emit, say, warn, writable
-from rcsa_ident.errors import InputError
-from rcsa_ident.remarks import counted
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import counted
 
 if TYPE_CHECKING:
-    from rcsa_ident.io.tool_libraries import Imported
+    from rcsa_ident.io.settings.tool_libraries import Imported
     from rcsa_ident.tool_holder.geometry import Contact
     from rcsa_ident.tool_holder.spread import Spread
 
@@ -68,7 +68,7 @@ def import_tools(
 ) -> None:
     """Make toolings from the tool library of a CAM program; each file says what was assumed."""
     from rcsa_ident.io.files import filling, write_text
-    from rcsa_ident.io.tool_libraries import Assumptions, file_names, read_tool_library
+    from rcsa_ident.io.settings.tool_libraries import Assumptions, file_names, read_tool_library
 
     if (out is None) != list_:
         raise InputError("--out", "nothing" if out is None else "given together with --list", "a folder, or --list")
@@ -112,7 +112,7 @@ def draw(
 ) -> None:
     """Draw a tooling to scale, dimensioned in millimetres."""
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.report.drawing import tooling_svg
 
     writable(out)
@@ -138,7 +138,7 @@ def holders(
     json_: Json = False,
 ) -> None:
     """Print a holder of the catalogue as \\[holder], \\[contact] and \\[spread] of a TOOLING.toml, or what there is."""
-    from rcsa_ident.io.toolings import contact_spread_keys, holder_keys, tooling_text, typical_contact_keys
+    from rcsa_ident.io.settings.toolings import contact_spread_keys, holder_keys, tooling_text, typical_contact_keys
     from rcsa_ident.tool_holder.catalogue import bores, chucks, tapers
     from rcsa_ident.tool_holder.catalogue import holder as made
 
@@ -176,7 +176,7 @@ def _contact(path: Path | None) -> tuple[Contact | None, Spread | None]:
     """A tooling's contact, and how well it is known."""
     if path is None:
         return None, None
-    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.io.settings.setups import read_tooling
 
     tooling = read_tooling(path)
     if tooling.assembly.contact is None:
@@ -206,7 +206,7 @@ def _show(entries: list[Imported]) -> None:
     from rich.table import Table
 
     from rcsa_ident.cli.tables import show
-    from rcsa_ident.machining_setup import BareCutter
+    from rcsa_ident.setup.machining_setup import BareCutter
 
     table = Table()
     for title in ("no.", "tool", "type", "teeth", "Ø mm", "stickout + insertion mm", ""):

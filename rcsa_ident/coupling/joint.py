@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import non_negative, positive
+from rcsa_ident.base.errors import non_negative, positive
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 
 #: Weights of the second differences, and one over their standard deviations.
 Bend = tuple[FloatArray, FloatArray]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL, remarks_of
-from rcsa_ident.remarks import Remark
-from rcsa_ident.shown import Shown
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL, remarks_of
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.shown import Shown
 
 #: What each field is called in messages, and its range; the others are how well these are known.
 _RANGES = {

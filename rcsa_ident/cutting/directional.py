@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 

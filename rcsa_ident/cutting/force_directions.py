@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter

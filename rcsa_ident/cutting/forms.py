@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.rows import Rows
 
 #: How many of the directions count: x and y, with z, with the slopes.

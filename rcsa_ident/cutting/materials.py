@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 _COEFFICIENTS = {
     "tangential_coefficient_mpa", "radial_ratio", "axial_ratio", "tangential_edge_n_per_mm", "radial_edge_n_per_mm", "axial_edge_n_per_mm",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import stdtrit
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 
 #: A cluster's own leverage from which on its residual is nothing but rounding.
 _ALONE = 1.0 - 1e-7

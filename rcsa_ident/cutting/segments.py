@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.shown import Shown
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.shown import Shown
 
 #: What rounding leaves of a length, as a share of the outline's size.
 ROUNDING = 1e-9

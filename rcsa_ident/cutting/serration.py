@@ -7,9 +7,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.shown import Shown
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.shown import Shown
 
 
 class WaveShape(StrEnum):

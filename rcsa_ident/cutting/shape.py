@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 
-from rcsa_ident.remarks import Remark, RemarkCode
+from rcsa_ident.base.remarks import Remark, RemarkCode
 
 
 class CutterShape(StrEnum):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 
 class Dof(StrEnum):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 
 #: Lines whose median counts: more than a resonance has at its top, fewer than those over which noise changes.
 _WINDOW = 41

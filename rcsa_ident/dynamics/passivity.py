@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.errors import InputError
-from rcsa_ident.remarks import Remark, RemarkCode
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark, RemarkCode
 
 #: Share of the largest accelerance below which the first lines are drift or silence. Chosen on six FRFs of hammer tests, as measured,
 #: reversed, conjugated and with exchanged columns: from 0.001 to 0.02 they are judged alike; above, one is no longer turned by itself.

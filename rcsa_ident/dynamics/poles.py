@@ -8,12 +8,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.state_space import StateSpace
-from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Shown
-from rcsa_ident.units import to_hz
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.base.units import to_hz
 
 #: Condition number of the eigenvectors beyond which poles are taken to coincide.
 _COINCIDING = 1e12

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

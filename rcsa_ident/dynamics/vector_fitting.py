@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 
 #: An entry smaller than this share of its rms size is fitted as if it were that large, where no noise says otherwise.
 FLOOR = 0.02

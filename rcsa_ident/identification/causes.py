@@ -18,7 +18,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.data import LEVER, IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.linearisation import Linearisation, Residual

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.answer import CoupledFit, Fit, PlaneFit
+from rcsa_ident.identification.assemble_result import CoupledFit, Fit, PlaneFit
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.causes import with_orders
 from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupled_data
@@ -46,9 +46,9 @@ from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.search import SearchSettings, explore
-from rcsa_ident.identification.swept import unswept
+from rcsa_ident.identification.sweep_correction import unswept
 from rcsa_ident.identification.task import Phase, finite, perform
-from rcsa_ident.scaleout import Map
+from rcsa_ident.base.scaleout import Map
 
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.linearisation import DELAY_UNIT
 from rcsa_ident.identification.misfit import Evaluation, Misfit

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.identification._kernels import sum_cuts
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification._kernels.lines import sum_cuts
 from rcsa_ident.identification.parameters import Unknowns
 
 #: Unit of a delay in the normal equations [s].

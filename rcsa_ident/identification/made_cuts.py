@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.base.arrays import FloatArray, frozen
 
 #: From one cut to the next where nobody tells it [s].
 USUAL_PAUSE = 90.0

@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.force import ForceTerm, scaled_force
-from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
-from rcsa_ident.identification._kernels import fit_cuts, force_rows, mix_cuts, turn_lines
+from rcsa_ident.identification._kernels.frf import cross_frf, cross_frf_gradient
+from rcsa_ident.identification._kernels.lines import fit_cuts, force_rows, mix_cuts, turn_lines
 from rcsa_ident.identification.data import AxisData, IdentificationData
 from rcsa_ident.identification.linearisation import DELAY_UNIT, Linearisation, Residual
 from rcsa_ident.identification.made_cuts import CutPrior

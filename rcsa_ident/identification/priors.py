@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, Layout, lower_triangle
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import LEVER, IdentificationData
 from rcsa_ident.tool_holder.drawings import RoughToolings

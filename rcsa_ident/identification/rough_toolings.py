@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.tool_holder.alteration import ALTERATIONS
 from rcsa_ident.tool_holder.drawings import RoughToolings
 from rcsa_ident.tool_holder.rough import RoughToolHolder

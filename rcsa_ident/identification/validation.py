@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.cutting.force import ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
@@ -21,7 +21,7 @@ from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.linearisation import Linearisation
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import Layout
-from rcsa_ident.identification.swept import unswept
+from rcsa_ident.identification.sweep_correction import unswept
 
 #: Weight of cuts that take no part: their delays are still fitted.
 _NO_PART = 1e-10

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 MEGABYTE = 1_000_000
 #: Bytes of a file, read or mapped: slices of either are bytes.

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.io.channels import Channel, Scratch, placed
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.text_header import DELIMITERS

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.channels import snapped
 from rcsa_ident.io.time_base import time_unit
 from rcsa_ident.io.validated_table import listed

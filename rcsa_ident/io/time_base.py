@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.signals.told_units import seconds_in
 
 #: Of a step: a time may stand this far from its place for other reasons than rounding.

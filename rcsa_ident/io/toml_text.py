@@ -10,7 +10,7 @@ from typing import Any
 import rtoml
 import tomli_w
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 
 LARGEST_SETUP = 4 * MEGABYTE

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes, replacing
 
 LARGEST_UFF = 512 * MEGABYTE

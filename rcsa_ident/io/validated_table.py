@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, NoReturn
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.plausibility import Range
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import Range
 
 _REQUIRED: Any = object()
 #: A date with its time of day, as `datetime.fromisoformat` reads it.

@@ -8,18 +8,18 @@ from functools import cached_property
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
-from rcsa_ident.machining_setup import Tooling, Workpiece
-from rcsa_ident.stability.label_posterior import FEWEST, LabelModel, LabelPosterior
+from rcsa_ident.setup.machining_setup import Tooling, Workpiece
+from rcsa_ident.stability.labels.label_posterior import FEWEST, LabelModel, LabelPosterior
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tested_cuts import TestedCuts
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 from rcsa_ident.stability.tip_modes import TIP, TipModes
-from rcsa_ident.stability.uncertain_tip import TipLimits, UncertainTip
+from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 
 #: What is said of a posterior that few draws stand for.

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.linalg
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.poles import PoleResidue

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import RationalFit, rational_fit
 from rcsa_ident.observer.transfer_function import (

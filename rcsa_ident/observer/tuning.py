@@ -7,8 +7,8 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.observer.force_model import ForceModel, RandomWalk, TeethResonators
 from rcsa_ident.observer.transfer_function import TransferFunction
 

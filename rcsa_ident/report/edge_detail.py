@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.segments import Line
 

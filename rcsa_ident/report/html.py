@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.cutting.stock import engagement_with
@@ -19,8 +19,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
-from rcsa_ident.machining_setup import Campaign, CutSpec, Tooling
-from rcsa_ident.remarks import says
+from rcsa_ident.setup.machining_setup import Campaign, CutSpec, Tooling
+from rcsa_ident.base.remarks import says
 from rcsa_ident.report import figures
 from rcsa_ident.report.drawing import tooling_svg
 from rcsa_ident.report.lobes import stability_figure
@@ -38,7 +38,7 @@ from rcsa_ident.report.summaries import (
 from rcsa_ident.report.workpiece_side import side_captions, side_mode_rows
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.version import __version__
 
 #: A logarithm that the data leave open by more than this is not told by them.

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath

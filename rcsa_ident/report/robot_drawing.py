@@ -9,7 +9,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.machine.robot.kinematics import posed, tool_point_at
 from rcsa_ident.machine.robot.model import RobotModel
 from rcsa_ident.report.robot_view import Part, PartKind, View, arm_parts, placed, reach_of

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.machine.robot.kinematics import posed
 from rcsa_ident.machine.robot.model import Frame, Joint, RobotModel
 from rcsa_ident.tool_holder.geometry import ToolAssembly

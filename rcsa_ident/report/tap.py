@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.report.figures import _STYLE, COLOURS
 from rcsa_ident.signals.tap import TapFrf
-from rcsa_ident.units import to_hz
+from rcsa_ident.base.units import to_hz
 
 
 def tap_figure(found: TapFrf) -> Figure:

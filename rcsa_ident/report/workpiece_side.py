@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
-from rcsa_ident.units import to_hz
+from rcsa_ident.base.units import to_hz
 
 
 @dataclass(frozen=True, slots=True)

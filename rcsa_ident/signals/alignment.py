@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.steady import SteadyRecord
 

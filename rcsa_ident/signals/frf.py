@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.motion import FLANGE_ALONE, ONE_PLACE, searched, usual_shares
 from rcsa_ident.signals.steady import SteadyRecord

@@ -8,12 +8,12 @@ from enum import StrEnum
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.plausibility import RATE
-from rcsa_ident.remarks import Remark, RemarkCode
-from rcsa_ident.shown import Drawn
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.plausibility import RATE
+from rcsa_ident.base.remarks import Remark, RemarkCode
+from rcsa_ident.base.shown import Drawn
 
 #: Samples of a block, in which recordings are gone through.
 BLOCK = 1 << 18

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.fft import next_fast_len
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.signals._kernels import angle_signal, angle_sums, order_signal, order_sums, turned
-from rcsa_ident.signals.loud_part import BAND, decimated
+from rcsa_ident.signals.active_segment import BAND, decimated
 from rcsa_ident.signals.recording import BLOCK, LONGEST
 from rcsa_ident.signals.steady_part import hann
 

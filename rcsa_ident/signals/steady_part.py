@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.signals._kernels import order_sums
 from rcsa_ident.signals.recording import BLOCK, LONGEST, Recording
 

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.teeth import edges_at
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.stability import _depth_kernels as kernels
-from rcsa_ident.stability._kernels import receptance_at
+from rcsa_ident.stability._kernels.depth_at_speed import depth as kernels
+from rcsa_ident.stability._kernels.depth_at_speed import receptance_at
 from rcsa_ident.stability.regeneration import directions_of, regeneration
 
 #: Ratio of the depths at which the mean stiffness is asked, and how far below the largest they begin.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 
 #: An eigenvalue that comes so close to the real axis, as a share of its way between two frequencies, may have touched it.
 NEAR = 0.15

@@ -7,10 +7,10 @@ from enum import StrEnum
 from importlib import import_module
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, runtime_checkable
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.stability.result import StabilityLobes

@@ -9,8 +9,8 @@ import numpy as np
 
 from rcsa_ident.cutting.power import spindle_load
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.shown import Shown
-from rcsa_ident.units import to_cm3_per_min, to_rpm
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.base.units import to_cm3_per_min, to_rpm
 
 
 class Bound(StrEnum):

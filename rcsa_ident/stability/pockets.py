@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_rpm
 
 #: Speeds with those beside them, at most: limits, and those of drawn machines, take memory for each.
 MOST_SPEEDS = 100_000

@@ -9,10 +9,10 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.plausibility import PlausibilityCode
-from rcsa_ident.remarks import Remark
-from rcsa_ident.shown import Shown
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.plausibility import PlausibilityCode
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.shown import Shown
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.spread import IDENTIFIED, LENGTHS, Spread
 

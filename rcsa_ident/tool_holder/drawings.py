@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered, fluted_segments
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.spread import Spread

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import pi
 
-from rcsa_ident.errors import InputError, non_negative, positive
-from rcsa_ident.shown import Shown
+from rcsa_ident.base.errors import InputError, non_negative, positive
+from rcsa_ident.base.shown import Shown
 
 
 @dataclass(frozen=True, slots=True)

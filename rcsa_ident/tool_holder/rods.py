@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.dynamics.structure import Structure, poles, projection_basis

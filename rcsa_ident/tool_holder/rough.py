@@ -15,7 +15,7 @@ from math import log
 import numpy as np
 import scipy.linalg
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.tool_holder._kernels import reduced_receptances
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered

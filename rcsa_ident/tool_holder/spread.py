@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 
-from rcsa_ident.errors import InputError, non_negative
+from rcsa_ident.base.errors import InputError, non_negative
 
 
 @dataclass(frozen=True, slots=True)

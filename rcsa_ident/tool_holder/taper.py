@@ -8,7 +8,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 
 #: Kinds of hollow taper shank by the sizes that are made, and how many sizes smaller the taper of a flange of that size is.

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
 
 #: Largest and smallest difference of an arc's radii at its ends that is taken for rounding [m]; between them a thousandth of the radius.
 _ROUNDED = (5e-6, 5e-4)

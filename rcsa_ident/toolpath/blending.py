@@ -9,8 +9,8 @@ import numpy as np
 import scipy.ndimage
 import scipy.signal
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import positive
 
 
 class Controller(Protocol):

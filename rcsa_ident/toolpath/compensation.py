@@ -14,8 +14,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.toolpath.deviation import Deviation
 from rcsa_ident.toolpath.path import ToolPath
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.path import ToolPath
 
 #: A controller that leaves no more than this of a path goes straight there [m].

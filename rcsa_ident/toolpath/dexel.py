@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.remarks import Remark
-from rcsa_ident.shown import Shown
-from rcsa_ident.toolpath._surface_kernels import crossings, nodes_and_rest, occupied, segments_between, surface_net
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.toolpath._kernels.surface import crossings, nodes_and_rest, occupied, segments_between, surface_net
 
 #: Of each grid the axis of its lines and those of its two indices.
 GRIDS = ((0, 2, 1), (1, 2, 0), (2, 0, 1))

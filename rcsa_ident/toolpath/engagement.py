@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.cutting.conditions import EngagementMap
-from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Shown
-from rcsa_ident.toolpath._engagement_kernels import distance_at, engage_upright, leaning_arcs
-from rcsa_ident.toolpath._layer_kernels import layer_arcs, material_ahead
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.toolpath._kernels.engagement import distance_at, engage_upright, leaning_arcs
+from rcsa_ident.toolpath._kernels.layer import layer_arcs, material_ahead
 from rcsa_ident.toolpath.removal import Sweep, frame_of
 from rcsa_ident.toolpath.solid import ToolSolid
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.signal
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.toolpath.path import ToolPath
 
 #: Above it forces are left aside [Hz]: teeth come and go faster than an arm follows.

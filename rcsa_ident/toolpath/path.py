@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.remarks import Remark
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import Remark
 
 #: Feed of a rapid move: as fast as the machine goes.
 RAPID = np.inf

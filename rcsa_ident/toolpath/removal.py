@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.shown import Shown
-from rcsa_ident.toolpath._dexel_kernels import cut_leaning, sweep_upright
-from rcsa_ident.toolpath._engagement_kernels import distance_at
-from rcsa_ident.toolpath._surface_kernels import last_move, moves_by_square
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.toolpath._kernels.dexel import cut_leaning, sweep_upright
+from rcsa_ident.toolpath._kernels.engagement import distance_at
+from rcsa_ident.toolpath._kernels.surface import last_move, moves_by_square
 from rcsa_ident.toolpath.dexel import GRIDS, DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.solid import ToolSolid

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.ndimage
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
 
 #: Gaussian profile filters of ISO 16610-21: half of a wave of the cut-off's length passes.
 _ALPHA = np.sqrt(np.log(2.0) / np.pi)

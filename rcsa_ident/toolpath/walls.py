@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
-from rcsa_ident.toolpath import _wall_kernels as kernels
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.toolpath._kernels import wall as kernels
 from rcsa_ident.toolpath.dexel import DexelField
 
 #: Where a column without material ends: farther from the path than any tool reaches [m].

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import expm
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, non_negative, positive
-from rcsa_ident.units import from_rpm
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, non_negative, positive
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
 
 #: Speed at which a share of one is lost once all is warm [rad/s].

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, non_negative, positive
 
 #: Frequencies of the hum over the mains', and their amplitudes over the first one's.
 _HUM = ((1.0, 1.0), (2.0, 0.4), (3.0, 0.5))

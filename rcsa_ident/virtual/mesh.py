@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.timoshenko import Section, beam_matrices, layer_matrices, section
 

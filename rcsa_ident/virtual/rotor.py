@@ -12,9 +12,9 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.virtual.machine import PerAxis, VirtualSpindle
 from rcsa_ident.virtual.mesh import HOLDER, SHAFT, TOOL, Mesh, add_tooling, element_edges, nanometres

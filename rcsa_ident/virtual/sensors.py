@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, non_negative, positive
 from rcsa_ident.virtual.disturbances import Disturbances, disturbed
 from rcsa_ident.virtual.milling import CutHistory
 

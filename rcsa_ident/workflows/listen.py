@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError
-from rcsa_ident.plausibility import RATE, SPINDLE_SPEED, TEETH
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import RATE, SPINDLE_SPEED, TEETH
 from rcsa_ident.signals.channel_scan import ChannelScan, scan
 from rcsa_ident.signals.listening import Event, Listening, Record, listen
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording, Sensor

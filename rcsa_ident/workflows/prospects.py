@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.force import force_and_slope
@@ -26,7 +26,7 @@ from rcsa_ident.identification.experiment_design import (
 )
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD
-from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.turning import turning_pair

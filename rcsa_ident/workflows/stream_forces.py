@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.observer.force import ForceBlock, ForceObserver, ObserverState, RunOut
 from rcsa_ident.signals.alignment import align
 from rcsa_ident.signals.recording import Quantity, Recording

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.signals.recording import Quantity
 from tests.fixtures import synthetic
 

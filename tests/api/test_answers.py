@@ -9,7 +9,7 @@ import pytest
 
 from api.work.answers import Answers
 from api.work.requests import MachineText, ToolingSource
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 MACHINE, TOOLING = MachineText("abc", "text"), ToolingSource("T1", "teeth = 2")
 

@@ -28,7 +28,7 @@ from api.serve import app
 from api.stores.entities import Document
 from api.stores.migrations import SCHEMA_VERSION
 from api.stores.sql import open_store
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.in_process import service
 from tests.api.recordings import content, declared
 from tests.fixtures import by_hand

@@ -17,12 +17,12 @@ from api.reading.campaign_text import FORMATS, campaign_of_text, declare, files_
 from api.reading.campaigns import load_campaign
 from api.schemas.campaigns import SensorKeys
 from api.transfer.archives import zipped
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.status import too_few
-from rcsa_ident.io.recordings import READERS, read_cut
-from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.recordings.readers import READERS, read_cut
+from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.io.toml_text import toml_of
-from rcsa_ident.io.toolings import tooling_keys
+from rcsa_ident.io.settings.toolings import tooling_keys
 from rcsa_ident.workflows.identify import judge_cut
 from tests.api.in_process import refused
 from tests.api.recordings import TOOLING, content, declared

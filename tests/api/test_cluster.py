@@ -8,7 +8,7 @@ import pytest
 
 from api.jobs.cluster import log, over_cluster
 from api.settings import from_environment
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.fixtures import scaleout_tasks as tasks
 
 
@@ -45,7 +45,7 @@ def test_without_a_cluster_it_is_done_here(monkeypatch, caplog):
 
 
 def away(address, timeout):
-    from rcsa_ident.scaleout import cluster_map
+    from rcsa_ident.base.scaleout import cluster_map
 
     return cluster_map(address, timeout)
 

@@ -37,9 +37,9 @@ from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.task import Phase
-from rcsa_ident.machining_setup import CutSpec
-from rcsa_ident.plausibility import PlausibilityCode
-from rcsa_ident.remarks import Remark, RemarkCode
+from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.base.plausibility import PlausibilityCode
+from rcsa_ident.base.remarks import Remark, RemarkCode
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.stream_forces import LiveObserver
 
@@ -275,7 +275,7 @@ def test_nothing_else_comes_out(text):
 
 def test_a_noun_whose_place_is_gone_is_unknown(monkeypatch):
     """Another version may have named a module that this one does not have."""
-    for place in ("rcsa_ident.nowhere.Dof", "rcsa_ident.errors.Dof"):
+    for place in ("rcsa_ident.nowhere.Dof", "rcsa_ident.base.errors.Dof"):
         monkeypatch.setitem(NOUNS, "Dof", place)
         codec._noun.cache_clear()
         with pytest.raises(Unknown):

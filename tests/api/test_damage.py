@@ -24,7 +24,7 @@ from api.stores.campaigns import Campaign
 from api.stores.entities import Damaged, Destroyed, Document, Machine, digest_of
 from api.stores.jobs import Outcome
 from api.stores.sql import open_store
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.identifying import carried, job, running
 from tests.api.in_process import BOTH, embedded, refused, service
 from tests.api.recordings import content, declared

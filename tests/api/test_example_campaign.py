@@ -9,7 +9,7 @@ import pytest
 
 from api.client import Client
 from api.reading.example_campaign import LARGEST, MACHINE
-from rcsa_ident.samples import SAMPLE_CUTS, sample_machine, sample_toolings
+from rcsa_ident.front.samples import SAMPLE_CUTS, sample_machine, sample_toolings
 from tests.api.identifying import declared, files, uploaded
 from tests.api.in_process import refused, service
 from tests.fixtures.waiting import until

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from api.client import Client, ServiceError
-from rcsa_ident.io.forces import read_forces_csv
+from rcsa_ident.io.curves.forces import read_forces_csv
 from rcsa_ident.signals.spectra import line_spectrum
 from tests.api.recordings import declared
 from tests.api.streaming import STREAM, closed, send, streaming, until

@@ -12,8 +12,8 @@ import pytest
 
 import rcsa_ident as ri
 from api.client import Client
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_campaign, read_tooling
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.api.identifying import carried

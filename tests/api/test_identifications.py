@@ -26,10 +26,10 @@ from api.shares import Shares
 from api.stores.entities import Machine
 from api.stores.jobs import Event, Job, Outcome
 from rcsa_ident.cli import app
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.task import Phase
-from rcsa_ident.io.recordings import read_cut
-from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.recordings.readers import read_cut
+from rcsa_ident.io.settings.setups import read_campaign
 from tests.api import identifying
 from tests.api.identifying import Steps, carried, declared, uploaded
 from tests.api.in_process import URL, embedded, refused, service

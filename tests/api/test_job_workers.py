@@ -24,7 +24,7 @@ from api.serve import job_worker
 from api.settings import Settings
 from api.stores.entities import Machine
 from api.stores.jobs import Outcome, Worker
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.identifying import Steps, job, left, running
 from tests.fixtures.waiting import until
 

@@ -13,7 +13,7 @@ from api.jobs.leases import Leases
 from api.live import jobs as followed
 from api.settings import Settings
 from api.stores.entities import Unavailable
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.identifying import job, running
 from tests.api.in_process import BOTH, service
 from tests.api.test_lobe_jobs import SPEEDS

@@ -14,8 +14,8 @@ from api.client import Client
 from api.routes import examples
 from api.work import libraries
 from rcsa_ident.cli import app
-from rcsa_ident.io.tested_cuts import read_tested_cuts
-from rcsa_ident.io.tool_libraries import Assumptions, import_tools
+from rcsa_ident.io.settings.tested_cuts import read_tested_cuts
+from rcsa_ident.io.settings.tool_libraries import Assumptions, import_tools
 from tests.api.in_process import refused, service
 from tests.fixtures import by_hand
 from tests.fixtures.paths import SAMPLES

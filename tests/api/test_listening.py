@@ -18,7 +18,7 @@ from api.problems import MEDIA_TYPE
 from api.reading.reader import Limits, Reader
 from api.settings import Settings
 from rcsa_ident.cli import app
-from rcsa_ident.io.frf_files import read_frfs
+from rcsa_ident.io.curves.frf_files import read_frfs
 from tests.api.in_process import Here, embedded, refused, service
 from tests.signals.test_tap import RATE, hits, receptance
 

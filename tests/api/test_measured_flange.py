@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from api.client import Client
-from rcsa_ident.io.flanges import write_flange_machine
-from rcsa_ident.io.forces import read_forces_csv
+from rcsa_ident.io.curves.flanges import write_flange_machine
+from rcsa_ident.io.curves.forces import read_forces_csv
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
 from tests.fixtures.flange_machine import decoupled_file, flange_machine

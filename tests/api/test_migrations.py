@@ -25,7 +25,7 @@ from api.stores import migrations, tables
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Key, Machine, digest_of
 from api.stores.sql import open_store
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.in_process import POSTGRESQL, SQLITE, database
 
 EARLIER = Path(__file__).parents[1] / "fixtures" / "earlier_stores"

@@ -5,9 +5,9 @@ import tomllib
 import pytest
 
 from api.reading.campaign_text import campaign_of_text, declare
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.hdf5 import write_hdf5
-from rcsa_ident.io.machines import read_machine
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
+from rcsa_ident.io.settings.machines import read_machine
 from tests.api.recordings import declared
 from tests.fixtures.paths import MACHINES, TOOLINGS
 from tests.fixtures.virtual_pass import RPM, SPEEDS, Pass

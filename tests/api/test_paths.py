@@ -15,9 +15,9 @@ from api.jobs.worker import carry
 from api.schemas.paths import PathMillingQuery, PathStabilityQuery, RemovalQuery
 from api.work import path_answers
 from api.work import paths as work
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.meshes import write_mesh
-from rcsa_ident.io.robots import robot_keys
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.paths.meshes import write_mesh
+from rcsa_ident.io.settings.robots import robot_keys
 from tests.api.identifying import Steps, carried, carriers
 from tests.api.in_process import refused
 from tests.fixtures import by_hand

@@ -20,8 +20,8 @@ from api.work.kernels import Kernels
 from api.work.pool import Busy, Pool, guarded
 from api.work.requests import TooLong
 from api.work.worker import Failed, QueryLimits, Worker
-from rcsa_ident.errors import InputError
-from rcsa_ident.workflows import compile_kernels
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.front import compile_kernels
 from tests.fixtures.waiting import ended, until
 
 

@@ -28,7 +28,7 @@ from api.reading.reader import Limits, Reader, _answer
 from api.reading.room import Room
 from api.reading.samples import write_normalised
 from api.work.pool import Busy
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.fixtures.waiting import PATIENCE, ended, until
 
 LIMITS = Limits(memory=512, seconds=1.0, wall_seconds=60.0, calls=50)

@@ -12,8 +12,8 @@ import pytest
 
 from api.files import NORMALISED, UPLOADS
 from api.reading.samples import read_normalised
-from rcsa_ident.io.hdf5 import write_hdf5
-from rcsa_ident.io.recordings import read_recording
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
+from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.api.in_process import refused, service
 from tests.api.recordings import RATE, RPM, channels, content, declared, pair

@@ -13,7 +13,7 @@ from api.settings import Settings
 from api.stores.changes import TOOLING
 from api.stores.entities import Document, Machine, digest_of
 from api.stores.jobs import Applied, Event, Outcome
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.identifying import running
 from tests.api.in_process import BOTH, embedded, service
 from tests.fixtures.waiting import until

@@ -14,8 +14,8 @@ from api.main import create_app
 from api.reading.reader import Limits, Reader
 from api.settings import Settings
 from rcsa_ident.cli import app
-from rcsa_ident.io.setups import read_tooling, tooling_of
-from rcsa_ident.io.toolings import tooling_keys, tooling_text
+from rcsa_ident.io.settings.setups import read_tooling, tooling_of
+from rcsa_ident.io.settings.toolings import tooling_keys, tooling_text
 from tests.api.in_process import Here, embedded, refused, service
 from tests.api.test_listening import HOSTILE, files_in, wav
 from tests.fixtures.rung_tooling import rung_tooling

@@ -12,13 +12,13 @@ from api.schemas.queries import Band, ToolingAdvice, ToolingLobes
 from api.schemas.toolings import ToolingKeys
 from api.work.tasks import modes
 from rcsa_ident.dynamics.uncertain import Doubted
-from rcsa_ident.io.drawings import known_toolings_to_json
-from rcsa_ident.io.schemas import SCHEMAS, schema_of
-from rcsa_ident.io.setups import SPREADS
+from rcsa_ident.io.results.drawings import known_toolings_to_json
+from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of
+from rcsa_ident.io.settings.setups import SPREADS
 from rcsa_ident.report.summaries import band_summary
-from rcsa_ident.stability.dominance import BandShares
+from rcsa_ident.stability.band_shares import BandShares
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
-from rcsa_ident.tool_holder.learned import LearnedValue
+from rcsa_ident.tool_holder.learnt import LearnedValue
 from rcsa_ident.tool_holder.spread import Spread
 from tests.api.in_process import refused
 from tests.fixtures import by_hand

@@ -19,7 +19,7 @@ from api.client import Client
 from api.data_folder import alone
 from api.main import create_app
 from api.settings import Settings, from_environment
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.in_process import Here, Near, refused
 from tests.fixtures import by_hand
 from tests.fixtures.service import command, free_port, serving

@@ -14,7 +14,7 @@ from api.security import make_key, new_id, now
 from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import ABSENT, Document, Machine, Stale, Taken, Unavailable, digest_of
 from api.stores.sql import open_store
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.fixtures.postgres import postgres, postgres_server  # noqa: F401
 
 

@@ -22,7 +22,7 @@ from api.streams.frames import MOST_INDEX, MOST_SAMPLES, TooLarge, packed, sampl
 from api.streams.hub import MOST_FLYING, PAUSED, Hub, StreamLimits
 from api.streams.listener import WAITING_BYTES, WAITING_TEXTS, Listener
 from api.streams.session import BLOCK, FLYING, About, End, Session, Stage
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 ABOUT = About("s", "A", "", "m", "T1", "now", 1000.0, ("X", "Y"), 2, 10_000)
 

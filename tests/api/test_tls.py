@@ -14,7 +14,7 @@ from api.connections import Connections
 from api.main import create_app
 from api.settings import Settings
 from api.tls import Certificate
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.api.in_process import Here, Near
 from tests.api.test_connections import listening
 from tests.fixtures.certificates import self_made

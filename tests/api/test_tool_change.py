@@ -16,10 +16,10 @@ from api.work.machine_cache import MachineCache
 from rcsa_ident.cli import app
 from rcsa_ident.cutting.materials import materials
 from rcsa_ident.identification import machine as identified
-from rcsa_ident.io.curves import read_frf_csv
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.setups import tooling_of
-from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.io.curves.tips import read_frf_csv
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.settings.setups import tooling_of
+from rcsa_ident.setup.machining_setup import CutSpec
 from rcsa_ident.tool_holder.catalogue import holder
 from rcsa_ident.workflows import tool_change
 from rcsa_ident.workflows.advise import advise

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.io.identifications import identification_to_json
-from rcsa_ident.io.results import layout, plain
+from rcsa_ident.io.results.identifications import identification_to_json
+from rcsa_ident.io.results.parts import layout, plain
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide
 from rcsa_ident.signals.recording import Role
 from tests.api.in_process import refused

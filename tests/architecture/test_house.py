@@ -87,7 +87,7 @@ def test_one_place_turns_speeds_into_rad_per_s():
     for path in (p for folder in ("rcsa_ident", "api") for p in (ROOT / folder).rglob("*.py")):
         if factor.search(path.read_text()):
             offenders.add(str(path.relative_to(ROOT)))
-    assert offenders == {"rcsa_ident/units.py"}
+    assert offenders == {"rcsa_ident/base/units.py"}
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_errors_are_in_the_words_of_the_library():
         texts = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str) and id(n) not in documents]
         offenders += [f"{path.relative_to(ROOT)}:{text.lineno}" for text in texts if option.search(text.value)]
     # the last one is an option of Dask's own worker
-    assert [offender.split(":")[0] for offender in offenders] == ["rcsa_ident/scaleout.py"], offenders
+    assert [offender.split(":")[0] for offender in offenders] == ["rcsa_ident/base/scaleout.py"], offenders
 
 
 def drawn_tree() -> set[str]:

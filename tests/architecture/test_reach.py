@@ -14,14 +14,14 @@ from tests.fixtures.reach import reached
 @pytest.mark.parametrize(
     ("changed", "test", "reach"),
     [
-        ("rcsa_ident/io/gcode.py", "tests/io/test_gcode.py", True),
-        ("rcsa_ident/io/gcode.py", "tests/dynamics/test_modal.py", False),
+        ("rcsa_ident/io/paths/gcode.py", "tests/io/paths/test_gcode.py", True),
+        ("rcsa_ident/io/paths/gcode.py", "tests/dynamics/test_modal.py", False),
         # through others, and by names in strings
         ("rcsa_ident/dynamics/_kernels.py", "tests/stability/test_zero_order.py", True),
-        ("rcsa_ident/io/parquet.py", "tests/cli/test_forces.py", True),
+        ("rcsa_ident/io/recordings/parquet.py", "tests/cli/test_forces.py", True),
         ("rcsa_ident/stability/semi_discretisation.py", "tests/api/test_tool_change.py", True),
         # a process imports what it likes
-        ("rcsa_ident/version.py", "tests/front_door/test_names.py", True),
+        ("rcsa_ident/version.py", "tests/front/test_names.py", True),
         ("api/tls.py", "tests/api/test_serve.py", True),
         ("tests/fixtures/by_hand.py", "tests/cli/test_lobes.py", True),
         ("tests/cli/conftest.py", "tests/cli/test_lobes.py", True),

@@ -56,7 +56,7 @@ def test_a_find_is_kept_once_and_as_small_as_it_was_met(tmp_path):
 
 
 def test_an_exception_is_told_by_the_projects_own_line():
-    from rcsa_ident.io.gcode import gcode_of
+    from rcsa_ident.io.paths.gcode import gcode_of
 
     with pytest.raises(TypeError) as caught:
         gcode_of(5, "given")  # type: ignore[arg-type]

@@ -8,8 +8,8 @@ import pytest
 from benchmarks import labelled_cuts
 from benchmarks.label_scores import Score
 from benchmarks.labelled_cuts import CUTS, TRAINING, Pool, limits_of, read, scores_after, unseen
-from rcsa_ident.stability.label_posterior import LabelModel
-from rcsa_ident.stability.tested_cuts import Verdict
+from rcsa_ident.stability.labels.label_posterior import LabelModel
+from rcsa_ident.stability.labels.tested_cuts import Verdict
 from tests.fixtures.paths import ROOT
 
 needs_cuts = pytest.mark.skipif(not CUTS.exists(), reason="the labelled cuts are not beside the project")

@@ -27,8 +27,8 @@ from benchmarks.machines import (
 )
 from benchmarks.machines import drawn as named_one
 from benchmarks.study import MACHINES
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 
 ALL = (*EVALUATION, *DEVELOPMENT)
 

@@ -71,7 +71,7 @@ def test_what_is_told_as_equivalent_stands_in_its_module():
 
 @pytest.mark.slow
 def test_a_mutant_that_tests_notice_is_killed(capsys, monkeypatch):
-    killed, survivors, same, _ = mutation.score("rcsa_ident/units.py", ["tests/io/test_spindle_drives.py"], 5, 1)
+    killed, survivors, same, _ = mutation.score("rcsa_ident/base/units.py", ["tests/io/settings/test_spindle_drives.py"], 5, 1)
     assert killed + survivors + same == 5
     with pytest.raises(SystemExit, match="hold no test"):
-        mutation.score("rcsa_ident/units.py", ["tests/oracles/analytic.py"], 1, 1)
+        mutation.score("rcsa_ident/base/units.py", ["tests/oracles/analytic.py"], 1, 1)

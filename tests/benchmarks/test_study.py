@@ -15,13 +15,13 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.search import SearchSettings
-from rcsa_ident.io.curves import write_frf_csv
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.curves.tips import write_frf_csv
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.stability.tip_modes import TIP
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks import tested_cuts as cuts
-from rcsa_ident.io.cases import read_cases
-from rcsa_ident.stability.tested_cuts import Verdict
+from rcsa_ident.io.settings.cases import read_cases
+from rcsa_ident.stability.labels.tested_cuts import Verdict
 
 
 def test_a_case_is_written_as_the_command_reads_it(tmp_path, monkeypatch):

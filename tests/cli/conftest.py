@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rcsa_ident.io.identifications import identification_to_json
-from rcsa_ident.io.results import write_result
+from rcsa_ident.io.results.identifications import identification_to_json
+from rcsa_ident.io.results.parts import write_result
 from tests.fixtures import by_hand
 from tests.fixtures.campaign import part_of_the_sample_runs
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.io.dynamometer import read_workpiece
-from rcsa_ident.io.hdf5 import write_hdf5
-from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.settings.dynamometer import read_workpiece
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
+from rcsa_ident.io.settings.setups import read_campaign
 from tests.cli.measurements import run
 from tests.fixtures import by_hand
 from tests.fixtures.dynamometer import TRUE, plan, true_force

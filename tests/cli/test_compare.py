@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.io.curves import write_frf_csv
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.results import read_result
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.curves.tips import write_frf_csv
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.results.parts import read_result
+from rcsa_ident.io.settings.setups import read_tooling
 from tests.cli.measurements import run
 
 pytestmark = pytest.mark.slow

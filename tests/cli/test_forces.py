@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli.forces import forces
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.forces import read_forces_csv, sensors_of_result, write_forces_csv
-from rcsa_ident.io.hdf5 import write_hdf5
-from rcsa_ident.io.results import read_result, write_result
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.curves.forces import read_forces_csv, sensors_of_result, write_forces_csv
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
+from rcsa_ident.io.results.parts import read_result, write_result
 from tests.fixtures.flange_machine import BAND, flange_keys, paper_cut
 from tests.fixtures.oblique_cut import oblique_cut, oblique_machine
 from tests.fixtures.paths import TOOLINGS

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 import rcsa_ident as ri
 from rcsa_ident.cli import app
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.hit import OMEGA, write_hit
 from tests.fixtures.paths import MACHINES

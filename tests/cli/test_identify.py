@@ -17,10 +17,10 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.diagnostics import failed
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.status import Status
-from rcsa_ident.io.identifications import machine_from_json
-from rcsa_ident.io.results import read_result
-from rcsa_ident.io.setups import read_campaign
-from rcsa_ident.remarks import Remark
+from rcsa_ident.io.results.identifications import machine_from_json
+from rcsa_ident.io.results.parts import read_result
+from rcsa_ident.io.settings.setups import read_campaign
+from rcsa_ident.base.remarks import Remark
 from tests.fixtures import by_hand
 from tests.fixtures.campaign import part_of_the_sample_runs
 from tests.fixtures.kept import kept
@@ -168,7 +168,7 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
     out = tmp_path / "R.json"
     monkeypatch.setattr("rcsa_ident.workflows.speed_bands.FEWEST_CUTS", 4)
     # the ids of the hand-made answer are not the campaign's: only the bands' part of the file is of interest
-    monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
+    monkeypatch.setattr("rcsa_ident.io.results.identifications._delays", lambda *_: {})
     run("identify", small_campaign, "--out", out, "--speed-bands", 2, "--processes", 1, code=3)
     whole, *bands = seen
     assert whole[2] is None
@@ -201,7 +201,7 @@ def test_the_exit_code_follows_the_status(tmp_path, small_campaign, monkeypatch,
             return failed(data, seed, "default") if change is None else replace(by_hand.identification(), **change)
 
     monkeypatch.setattr(evidence, "EvidenceSelection", Found)
-    monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
+    monkeypatch.setattr("rcsa_ident.io.results.identifications._delays", lambda *_: {})
     out = tmp_path / "R.json"
     report = ["--report", tmp_path / "report.html"] if change is None else []
     said = run("identify", small_campaign, "--out", out, "--processes", 1, *report, code=code)

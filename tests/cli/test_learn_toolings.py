@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.toml_text import toml_of
 from tests.fixtures import further_cuts
 from tests.fixtures.campaign import part_of_the_sample_runs

@@ -11,7 +11,7 @@ from scipy.io import wavfile
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
 
 KEYS = {
     "spindle_speed_rpm", "spindle_speed_std_rpm", "speed_wander_percent", "ramp", "teeth", "explained_share", "verdict", "reasons",

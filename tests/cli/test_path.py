@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.meshes import read_mesh, write_mesh
+from rcsa_ident.io.paths.meshes import read_mesh, write_mesh
 from tests.fixtures.paths import TOOLINGS
 from tests.toolpath.test_surface_kernels import box
 

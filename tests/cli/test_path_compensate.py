@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.identification.posed.parameters import PosedLayout
-from rcsa_ident.identification.posed.priors import arm_priors, posed_prior_rows
-from rcsa_ident.io.gcode import read_gcode
-from rcsa_ident.io.paths import read_tool_path
-from rcsa_ident.io.robots import robot_keys
+from rcsa_ident.identification.arm.parameters import PosedLayout
+from rcsa_ident.identification.arm.priors import arm_priors, posed_prior_rows
+from rcsa_ident.io.paths.gcode import read_gcode
+from rcsa_ident.io.paths.tool_paths import read_tool_path
+from rcsa_ident.io.settings.robots import robot_keys
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.robots import ROBOTS, robot
 

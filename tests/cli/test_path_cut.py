@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.robots import ROBOTS
 

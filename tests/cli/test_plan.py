@@ -15,8 +15,8 @@ from rcsa_ident.cli.plan import plan
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack, parameter_names
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.io.results import spindle_to_json, write_result
-from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.results.parts import spindle_to_json, write_result
+from rcsa_ident.io.settings.setups import read_campaign
 
 DATA = Path(__file__).parents[2] / "data"
 TOOLINGS = DATA / "machines" / "toolings"

@@ -14,7 +14,7 @@ import time
 import pytest
 
 from rcsa_ident.identification.progress import Stage, Step
-from rcsa_ident.processes import THREADS, workers
+from rcsa_ident.front.processes import THREADS, workers
 from tests.fixtures.waiting import PATIENCE, until
 
 
@@ -109,7 +109,7 @@ SCRIPT = """
 import os
 from functools import partial
 from operator import methodcaller
-from rcsa_ident.processes import workers
+from rcsa_ident.front.processes import workers
 
 class Gain:
     def __call__(self, x): return 3 * x
@@ -166,7 +166,7 @@ CTRL_C = """
 import signal, sys
 sys.path.insert(0, {root!r})
 from long_work import work
-from rcsa_ident.processes import workers
+from rcsa_ident.front.processes import workers
 def main():
     try:
         with workers(3, early=()) as pool:

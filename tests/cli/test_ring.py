@@ -9,8 +9,8 @@ import soundfile
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.io.settings.setups import read_tooling
+from rcsa_ident.setup.machining_setup import Tooling
 from tests.fixtures.rung_tooling import rung_tooling
 
 
@@ -50,7 +50,7 @@ def test_a_drawing_is_corrected(rung):
 
 @pytest.mark.parametrize("form", [(), ("--json",)], ids=["words", "json"])
 def test_a_suspect_answer_is_written_and_ends_with_exit_code_3(rung, tmp_path, monkeypatch, form):
-    monkeypatch.setattr("rcsa_ident.identification.ringing.SUSPECT", 2.0)  # no probability is as high
+    monkeypatch.setattr("rcsa_ident.identification.ring.ringing.SUSPECT", 2.0)  # no probability is as high
     folder, _, _ = rung
     found = run("ring", folder / "DRAWN.toml", folder / "whole.wav", "--out", tmp_path / "R.toml", *form)
     assert (found.exit_code, (tmp_path / "R.toml").is_file()) == (3, True)

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.curves import read_frf_csv
-from rcsa_ident.io.robots import read_robot
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.curves.tips import read_frf_csv
+from rcsa_ident.io.settings.robots import read_robot
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.robot.compliance import free_play, sag
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.robots import read_robot
+from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.machine.robot.compliance import static_compliance
 from tests.fixtures import pushed_arm
 from tests.fixtures.robots import ROBOTS, robot

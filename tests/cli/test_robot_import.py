@@ -6,7 +6,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.robots import read_robot
+from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.machine.robot.kinematics import flange_at
 from tests.fixtures.robots import TABLE_7, robot
 from tests.io.urdf_files import urdf_of

@@ -6,7 +6,7 @@ import typer
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import schema
-from rcsa_ident.io.schemas import SCHEMAS, schema_of
+from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of
 
 app = typer.Typer()
 app.command("schema")(schema.schema)

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app, lobes
-from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv
-from rcsa_ident.io.identifications import machine_from_json, speed_band_to_json
-from rcsa_ident.io.results import read_result
+from rcsa_ident.io.curves.tips import read_frf_csv, read_lobes_csv
+from rcsa_ident.io.results.identifications import machine_from_json, speed_band_to_json
+from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD
 from tests.fixtures import by_hand
 

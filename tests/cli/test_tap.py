@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.frf_files import read_frfs
+from rcsa_ident.io.curves.frf_files import read_frfs
 from tests.signals.test_tap import RATE, hits, receptance
 
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import app as whole
 from rcsa_ident.cli import tools
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder import catalogue
 from rcsa_ident.tool_holder.spread import Spread
 from tests.fixtures.tool_library import END_MILL, end_mill, library

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import lobes
 from rcsa_ident.cli.tables import show_identification
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.io.curves import read_tip
-from rcsa_ident.io.identifications import identification_to_json
-from rcsa_ident.io.results import write_result
+from rcsa_ident.io.curves.tips import read_tip
+from rcsa_ident.io.results.identifications import identification_to_json
+from rcsa_ident.io.results.parts import write_result
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide
 from rcsa_ident.report.html import report_html
 from rcsa_ident.signals.recording import Role

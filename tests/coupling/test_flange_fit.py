@@ -17,8 +17,8 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.coupling.smoothing import band_covariance, band_solve, bending, second_differences
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.receptance import dissipation
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import read_machine
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.rotor import frequency_response, rotor

@@ -14,7 +14,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import damped_modes
 from rcsa_ident.dynamics.receptance import Receptance, dissipation
 from rcsa_ident.dynamics.structure import Structure, poles
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_structure

@@ -10,7 +10,7 @@ from rcsa_ident.cutting.conditions import Block, Engagement, Stepover
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.rows import rows_of
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 SLOT = Engagement(0.0, np.pi)
 

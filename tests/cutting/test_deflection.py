@@ -15,7 +15,7 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflected_process
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.oracles.literature import DEFORMED_TOOL, TIP_DEFLECTION_MM
 from tests.stability.mills import RPM
 

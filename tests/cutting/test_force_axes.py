@@ -14,7 +14,7 @@ from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.force_axes import axes_choices
 from rcsa_ident.cutting.force_record import ForceRecord
 from rcsa_ident.cutting.signal_fit import Dynamometer
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 COEFFICIENTS = CuttingCoefficients(900e6, 0.27, 0.15, 14e3, 17e3, 3e3)
 FEEDS = (4e-5, 8e-5, 1.2e-4)

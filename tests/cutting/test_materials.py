@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.cutting.materials import material, materials
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 
 def test_every_entry_says_where_it_comes_from():

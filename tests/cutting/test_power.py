@@ -12,7 +12,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import tooth_force
 from rcsa_ident.cutting.power import SpindleDrive, radial_depth, spindle_load
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 EDGES = CuttingCoefficients(800e6, 0.3, 0.1, 8e3, 6e3)
 

@@ -12,7 +12,7 @@ from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.cutting.teeth import deepest, lags
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.stability.tilted_ball import tilted_ball
 
 DEG = np.pi / 180.0

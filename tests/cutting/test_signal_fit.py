@@ -15,7 +15,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.force_record import ForceRecord
 from rcsa_ident.cutting.signal_fit import Dynamometer, calibrate_signal, eccentric
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 TRUE = np.array([800e6, 240e6, 12e3, 9e3])
 COEFFICIENTS = CuttingCoefficients(TRUE[0], TRUE[1] / TRUE[0], 0.0, TRUE[2], TRUE[3])

@@ -63,9 +63,9 @@ def test_examples_are_true(folder, monkeypatch):
     modules = [importlib.import_module(".".join(p.relative_to(ROOT).with_suffix("").parts)) for p in paths]
     found = {module.__name__: doctest.DocTestFinder(exclude_empty=True).find(module) for module in modules}
     tests = sorted(
-        (test for each in found.values() for test in each if test.examples), key=lambda test: test.name != "rcsa_ident.verbs.identify"
+        (test for each in found.values() for test in each if test.examples), key=lambda test: test.name != "rcsa_ident.front.verbs.identify"
     )
-    assert tests[0].name == "rcsa_ident.verbs.identify"
+    assert tests[0].name == "rcsa_ident.front.verbs.identify"
     assert run(tests) > 300
     text = comment("MATERIALS")
     assert run([doctest.DocTestParser().get_doctest(text, {}, "MATERIALS", None, None)]) == 3

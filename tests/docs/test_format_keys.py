@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks import formats
-from rcsa_ident.io.schemas import SCHEMAS
+from rcsa_ident.io.settings.schemas import SCHEMAS
 
 
 def test_the_page_is_as_the_code_says():

@@ -13,7 +13,7 @@ from rcsa_ident.dynamics.modal import damped_modes, normal_modes
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.state_space import StateSpace
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from tests.dynamics.test_state_space import OSCILLATOR, random_system, sampled
 
 #: A pair, and a real pole with half its residue.

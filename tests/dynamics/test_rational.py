@@ -13,9 +13,9 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.rational import FitStatus, fitted_poles, rational_fit
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 

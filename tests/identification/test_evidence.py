@@ -20,7 +20,7 @@ from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
-from rcsa_ident.remarks import says
+from rcsa_ident.base.remarks import says
 from tests.fixtures import by_hand
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 from tests.identification.models import vector_of

@@ -12,7 +12,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis
-from rcsa_ident.io import setups
+from rcsa_ident.io.settings import setups
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
 from rcsa_ident.stability.zero_order import ZeroOrder

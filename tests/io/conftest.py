@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
 
 TOOLING = """\
 name = "S1-ER32"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import read_bytes, replacing, write_text
 
 

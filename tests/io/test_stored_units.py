@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import read_cut, read_recording
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.recordings.readers import read_cut, read_recording
 from rcsa_ident.io.uff import UffAxis, UffFunction, write_uff
 from rcsa_ident.signals.recording import Quantity, Sensor
 
@@ -74,7 +74,7 @@ def test_si_needs_none(tmp_path, suffix, unit):
 
 
 def test_a_long_recording_that_stays_in_its_file_is_looked_at_too(tmp_path, monkeypatch):
-    monkeypatch.setattr("rcsa_ident.io.hdf5.LONGEST", 100)
+    monkeypatch.setattr("rcsa_ident.io.recordings.hdf5.LONGEST", 100)
     path = hdf5(tmp_path / "r.h5", "g")
     with pytest.raises(InputError, match="the file is in g"):
         read_cut((sensor(),), None, SimpleNamespace(recording=path, air=None))

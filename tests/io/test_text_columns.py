@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io import text_columns
 from rcsa_ident.io.files import existing_file
-from rcsa_ident.io.recordings import read_recording
+from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.io.time_base import Irregular, uniform
 from rcsa_ident.signals.recording import Quantity, Sensor
 

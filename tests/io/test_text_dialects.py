@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.open_recording import open_recording
-from rcsa_ident.io.recordings import read_recording
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.recordings.open_recording import open_recording
+from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 
 RATE, N = 25_600.0, 400

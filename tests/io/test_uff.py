@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.uff import ACCELERATION, EXCITATION_FORCE, FRF, UffAxis, UffFunction, read_uff, write_uff
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

@@ -4,7 +4,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from rcsa_ident.io.robots import turn_of
+from rcsa_ident.io.settings.robots import turn_of
 from rcsa_ident.machine.robot.model import Body, Frame, RobotModel
 
 

@@ -8,7 +8,7 @@ import control
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.observer.force import ForceObserver, RunOut, restore_mean_force
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.tuning import PaperWalk, Resonators, Tuning, harmonics

@@ -10,7 +10,7 @@ from filterpy.kalman import KalmanFilter as Plain
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.observer.force_model import AxisNoise, RandomWalk, TeethResonators, augmented
 from rcsa_ident.observer.kalman import kalman_filter, riccati
 from rcsa_ident.observer.transfer_function import SampledModes

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.robot.kinematics import flange_at, posed, tool_point_at
 from rcsa_ident.machine.robot.model import Frame, Joint, RobotModel
 from rcsa_ident.report.robot_drawing import arm_svg

@@ -12,13 +12,13 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.io.open_recording import open_recording
+from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.signals.listening import Heard, Listening
 from rcsa_ident.signals.measurement import measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.tap import tap
 from rcsa_ident.signals.verdict import RecordCode
-from rcsa_ident.units import from_rpm, to_rpm
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.workflows.listen import listen_to
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

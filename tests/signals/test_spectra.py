@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.signals.spectra import follow_speed, line_spectrum, refine_speed, segment_lines
 from tests.fixtures.synthetic import RATE, RPM, drift, profile, wave
 

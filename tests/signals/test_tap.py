@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.signals.tap import HitEstimator, tap
 
 RATE = 51200.0

@@ -13,7 +13,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.advice import highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.operating_point import Bound
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE

@@ -9,7 +9,7 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import METHODS, MethodName, Watched, coarse_to_fine, method_named
 from rcsa_ident.stability.time_domain import TimeDomain

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.pockets import AROUND, least_within_tolerance, pad_speeds, peaks, speeds_around
 
 SPEED = 100.0 * np.arange(1, 10)

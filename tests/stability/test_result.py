@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.pockets import least_within_tolerance
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
 from tests.stability.written import lobes

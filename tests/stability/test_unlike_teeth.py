@@ -9,7 +9,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.io.lobes import read_lobes, write_lobes
+from rcsa_ident.io.curves.lobes import read_lobes, write_lobes
 from rcsa_ident.report.summaries import lobes_summary
 from rcsa_ident.stability.advice import Advice, highest_removal, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation

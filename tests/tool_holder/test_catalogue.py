@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, stated, tapers
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.drawings import Drawing, KnownToolings, RoughUnknown, fitted, rough_toolings
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly

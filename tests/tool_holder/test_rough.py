@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.robot.compliance import at_rest, spring_torques, spring_twist, static_compliance
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.kinematics import tool_point_at
 from rcsa_ident.toolpath.compensation import ahead_of_force, mirrored
-from rcsa_ident.workflows.robot_compensation import ahead_of_forces, mirrored_postures, reached
+from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces, mirrored_postures, reached
 from tests.fixtures import pushed_arm
 from tests.fixtures.robots import robot
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.compensation import limited
 from rcsa_ident.toolpath.deviation import Deviation
 from rcsa_ident.toolpath.path import RAPID, ToolPath

@@ -5,7 +5,7 @@ import pytest
 
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.toolpath._dexel_kernels import cone_on_line, cut, frustum_on_line, radius_at, span_at, widest_between
+from rcsa_ident.toolpath._kernels.dexel import cone_on_line, cut, frustum_on_line, radius_at, span_at, widest_between
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import Sweep

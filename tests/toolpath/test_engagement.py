@@ -10,7 +10,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.engagement import chip_between_circles, chip_thickness, engagement_along
 from rcsa_ident.toolpath.path import ToolPath

@@ -5,8 +5,8 @@ import pytest
 
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.toolpath import _engagement_kernels as kernels
-from rcsa_ident.toolpath._engagement_kernels import arcs_of, distance_at, leaning_arcs, radius_and_slope, slice_arcs
+from rcsa_ident.toolpath._kernels import engagement as kernels
+from rcsa_ident.toolpath._kernels.engagement import arcs_of, distance_at, leaning_arcs, radius_and_slope, slice_arcs
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import Sweep

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.toolpath._layer_kernels import layer_arcs, material_ahead
+from rcsa_ident.toolpath._kernels.layer import layer_arcs, material_ahead
 from rcsa_ident.toolpath.dexel import DexelField
 
 

@@ -11,7 +11,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.poles import PoleResidue
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.march import Carrier, Cut, March, march, start_of
 from rcsa_ident.toolpath.walls import NOTHING, Walls
 

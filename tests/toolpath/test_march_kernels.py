@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcsa_ident.toolpath import _march_kernels as kernels
+from rcsa_ident.toolpath._kernels import march as kernels
 
 NOTHING = -1.0
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.toolpath import _surface_kernels as kernels
+from rcsa_ident.toolpath._kernels import surface as kernels
 from rcsa_ident.toolpath.dexel import GRIDS, DexelField, check_closed
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import made_by

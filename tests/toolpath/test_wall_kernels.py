@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.toolpath import _wall_kernels as kernels
+from rcsa_ident.toolpath._kernels import wall as kernels
 from rcsa_ident.toolpath.dexel import DexelField
 from tests.oracles.halfspace import half_space
 

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
 

@@ -15,7 +15,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.virtual.limit import directional_matrices, multiplier, true_limit

@@ -11,9 +11,9 @@ from rcsa_ident.cutting.force import force_history, force_lines, runout_force_li
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.dynamics.coordinates import Coordinate
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.virtual.milling import mill_cut, rigid_force_lines, synchronous_lines
 from rcsa_ident.virtual.reduction import Poles, poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor

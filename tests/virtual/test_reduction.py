@@ -3,9 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.virtual.reduction import Poles, alike, poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 

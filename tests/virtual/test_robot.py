@@ -7,8 +7,8 @@ import pytest
 import scipy.linalg
 
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.robot.carried_spindle import CarriedSpindle
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.model import Body

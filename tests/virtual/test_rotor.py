@@ -7,9 +7,9 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.machine import Bearing, FlangeJoint, Housing, VirtualSpindle

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.virtual.milling import CutHistory
 from rcsa_ident.virtual.sensors import (
     UNDISTURBED,

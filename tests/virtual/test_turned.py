@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import read_machine
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.virtual.machine import Bearing
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import poles, reduced

@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 from api.client import Client
 from rcsa_ident.cutting.outlines import TAKES, Dimensions, key_of, missing
-from rcsa_ident.io.cutters import DIMENSIONS
+from rcsa_ident.io.settings.cutters import DIMENSIONS
 from tests.fixtures import by_hand
 from tests.fixtures.waiting import until
 

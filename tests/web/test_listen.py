@@ -12,7 +12,7 @@ import soundfile
 from playwright.sync_api import Browser, Page, expect
 from scipy.io import wavfile
 
-from rcsa_ident.io.frf_files import read_frfs
+from rcsa_ident.io.curves.frf_files import read_frfs
 from tests.api.test_listening import CHATTER, samples, text_of_hits
 from tests.fixtures.service import Served
 from tests.signals.test_tap import receptance

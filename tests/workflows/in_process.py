@@ -10,7 +10,7 @@ import numpy as np
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor

@@ -10,12 +10,12 @@ from itertools import combinations
 
 import pytest
 
-from rcsa_ident.workflows.compile_kernels import FIRST, STEPS, TOGETHER
+from rcsa_ident.front.compile_kernels import FIRST, STEPS, TOGETHER
 
 #: Prints the kernels that steps call, by file, with what they were compiled for.
 CALLED = """
 import json, sys
-from rcsa_ident.workflows.compile_kernels import compile_steps
+from rcsa_ident.front.compile_kernels import compile_steps
 compile_steps(sys.argv[1:])
 kernels = {}
 for name, module in list(sys.modules.items()):

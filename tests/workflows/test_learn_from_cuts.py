@@ -7,15 +7,15 @@ import pytest
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.machining_setup import BareCutter, CutSpec
-from rcsa_ident.stability.label_posterior import Effort, LabelModel
-from rcsa_ident.stability.next_test import most_telling
-from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.uncertain_tip import UncertainTip
+from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
+from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel
+from rcsa_ident.stability.labels.next_test import most_telling
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.units import from_rpm
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.workflows.learn_from_cuts import Believed, learn_from_cuts, next_tests
-from tests.stability.test_uncertain_tip import modes
+from tests.stability.labels.test_uncertain_tip import modes
 
 TOOLING, CUT = BareCutter("T", Cutter(2, 0.012)), CutSpec()
 EFFORT = Effort(120, 60, 1, 50)

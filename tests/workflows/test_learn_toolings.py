@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.hammer_lines import HammerLines
-from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.io.toolings import write_tooling
+from rcsa_ident.io.settings.setups import read_tooling
+from rcsa_ident.io.settings.toolings import write_tooling
 from rcsa_ident.tool_holder.alteration import Alteration
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughToolings, RoughUnknown, rough_toolings
 from rcsa_ident.tool_holder.spread import EXACT, Spread

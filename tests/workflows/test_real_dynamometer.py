@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks.dynamometer import FILES, campaign
-from rcsa_ident.io.recordings import read_cut
-from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.recordings.readers import read_cut
+from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.workflows.calibrate import calibrate
 
 pytestmark = pytest.mark.skipif(not (FILES / "dynamometer").is_dir(), reason="the real recordings are not there")

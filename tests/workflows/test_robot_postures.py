@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.kinematics import tool_point_at
 from rcsa_ident.workflows.robot_postures import at_posture, following

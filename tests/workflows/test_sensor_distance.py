@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.hammer_lines import HammerLines
-from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.setup.machining_setup import Campaign, Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor, SensorCode, untold_distances
 from rcsa_ident.signals.verdict import Verdict
@@ -24,7 +24,7 @@ from tests.fixtures.flange_machine import flange_machine
 from tests.fixtures.paths import MACHINES
 from tests.fixtures.virtual_cut import relative_error, virtual_cut
 from tests.fixtures.virtual_shop import open_shop
-from tests.identification.posed.robots import sheet
+from tests.identification.arm.robots import sheet
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
 from rcsa_ident.workflows.stream_forces import LONGEST_BRIDGE, LiveObserver, live_observer
 from tests.fixtures.flange_machine import flange_machine

@@ -13,18 +13,18 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.identification.status import Status
-from rcsa_ident.io.flanges import read_flange_machine, write_flange_csv
+from rcsa_ident.io.curves.flanges import read_flange_machine, write_flange_csv
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.machine.speed_dependence import BLOCK, tips_over_speed
-from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.setup.machining_setup import CutSpec
 from rcsa_ident.stability.drawn_modes import of_draw
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DRAWS, both_directions, drawn_limits, stability_lobes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.stability_map import stability_map
-from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict, tally
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict, tally
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder

@@ -11,7 +11,7 @@ from pathlib import Path
 from sqlalchemy import Column, Connection, MetaData, PrimaryKeyConstraint, String, Table, insert, inspect, select
 
 from api.stores import tables
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 #: What Alembic reads.
 SCRIPTS = Path(__file__).parent

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 mode = ri.normal_modes([ri.hz(922.0)], [0.011], [[1.0 / np.sqrt(0.03993)]], (ri.Coordinate("tip", ri.Dof.X),))
 tip, aluminium = ri.TipModes.of({ri.Dof.X: mode}), ri.CuttingCoefficients(6e8, 1.0 / 3.0)

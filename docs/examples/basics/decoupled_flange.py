@@ -18,7 +18,7 @@ from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.units import to_hz
+from rcsa_ident.base.units import to_hz
 
 # %%
 # A machine of four modes stands for the real one.

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 # %%
 # Sixteen cuts to identify from; another one to monitor.

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.io import wavfile
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 # %%
 # The sound is made up: orders of a spindle that wanders a little, a chatter line at 1234.5 Hz, noise.

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.units import to_hz, to_rpm
 
 # %%
 # A mode is a natural frequency, a damping ratio and a mass-normalised shape; 0.03993 kg is its modal mass at the tip.

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 # %%
 # The sample runs were made by the virtual machine; of their 80 cuts every fifth is enough here. ``ri.sample_campaign`` makes new ones.

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.units import to_hz, to_rpm
 
 # %%
 # Three modes, and the same tip as an accelerometer shows it: noise that is alike at all lines in acceleration grows in the receptance

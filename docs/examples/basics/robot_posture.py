@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.workflows.robot_postures import at_posture, following, limits_along
 from rcsa_ident.workflows.tool_change import ToolChange
 

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 # %%
 # A well damped mode of 900 Hz in a slot, from 500 rev/min (54 waves from tooth to tooth) to 3000 (9 waves).

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 natural, zeta, mass, added = ri.hz(922.0), 0.011, 0.03993, 0.03
 tip = (ri.Coordinate("tip", ri.Dof.X), ri.Coordinate("tip", ri.Dof.Y))

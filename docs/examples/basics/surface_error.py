@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 # %%
 # One mode in each direction, three straight teeth, 5 % immersion in down-milling.

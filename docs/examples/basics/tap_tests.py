@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.units import to_hz, to_rpm
 
 rate, rng = 51_200.0, np.random.default_rng(1)
 modes = {"x": ((800.0, 0.03, 0.25), (1900.0, 0.02, 0.09)), "y": ((870.0, 0.035, 0.22), (2100.0, 0.02, 0.1))}  # Hz, -, kg

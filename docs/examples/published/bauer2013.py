@@ -18,8 +18,8 @@ import rcsa_ident as ri
 from rcsa_ident.machine.robot.compliance import static_compliance
 from rcsa_ident.machine.robot.flexible import modes_of
 from rcsa_ident.machine.robot.kinematics import tool_point_at
-from rcsa_ident.units import to_hz
-from rcsa_ident.workflows.robot_compensation import ahead_of_forces, mirrored_postures, reached
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces, mirrored_postures, reached
 
 # %%
 # Measured were 8.4, 11.1, 16.9 and 20.6 Hz, and 0.25 mm across under 100 N with the arm stretched out.

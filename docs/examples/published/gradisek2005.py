@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 # %%
 # Frequency [Hz], damping ratio and modal mass [kg] of each mode; K_t 697 MPa, K_n 255.8 MPa.

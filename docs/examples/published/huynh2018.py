@@ -15,8 +15,8 @@ import numpy as np
 import rcsa_ident as ri
 from rcsa_ident.machine.robot.flexible import modes_of
 from rcsa_ident.toolpath.march import Cut, mill_block
-from rcsa_ident.units import to_hz
-from rcsa_ident.workflows.robot_milling import arm_carrier, feed_turn
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.workflows.paths.robot_milling import arm_carrier, feed_turn
 
 # %%
 # The posture of the publication's table 7, and its cut: two unequal teeth of Ø10 mm, 4 mm wide, 1.6 mm deep, 3700 mm/min at 18 700 rev/min.

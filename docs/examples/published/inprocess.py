@@ -20,7 +20,7 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.tool_holder.geometry import Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.units import to_hz
+from rcsa_ident.base.units import to_hz
 
 # %%
 # Table A.5: frequency [Hz], damping [%], Re and Im of translation [1e-4 sqrt(s/kg)] and slope [1e-4 rad sqrt(s/(kg m²))]; the

@@ -15,8 +15,8 @@ import numpy as np
 from kept import real_files
 
 import rcsa_ident as ri
-from rcsa_ident.io.recordings import read_cut
-from rcsa_ident.machining_setup import BareCutter, Campaign, Cut
+from rcsa_ident.io.recordings.readers import read_cut
+from rcsa_ident.setup.machining_setup import BareCutter, Campaign, Cut
 from rcsa_ident.workflows.calibrate import calibrate
 
 feeds = (300, 900, 1500)

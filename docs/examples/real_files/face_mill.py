@@ -12,7 +12,7 @@ import numpy as np
 from kept import real_files
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.base.units import to_hz, to_rpm
 
 files = real_files("https://github.com/leekunhwee/Dynamics", "face_mill.png", "facemill_x.frf", "facemill_y.frf")
 if files:

@@ -14,7 +14,7 @@ import numpy as np
 from kept import real_files
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 parts = (
     "Di__Aluminum__End_Mill__0p5IN__7000RPM__SKF_UltiFlank_40pct",

@@ -13,7 +13,7 @@ import scipy.signal
 from kept import real_files
 
 import rcsa_ident as ri
-from rcsa_ident.units import to_rpm
+from rcsa_ident.base.units import to_rpm
 
 address = "https://github.com/hafeztrimukti29/chatter-detection-using-accoustic-approach-and-once-per-revolution-variance"
 files = real_files(address, "two_sounds.png", "milling_sound/Chatter.wav", "milling_sound/Stable.wav")

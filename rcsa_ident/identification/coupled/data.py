@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 

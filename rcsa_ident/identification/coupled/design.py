@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.data import CoupledData, coupled_data
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit

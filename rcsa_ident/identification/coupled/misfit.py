@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.identification._kernels import whiten
+from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification._kernels.lines import whiten
 from rcsa_ident.identification.coupled._kernels import LineArrays, MachineArrays, PointArrays, coupled_lines
 from rcsa_ident.identification.coupled.data import CoupledData, coupled_data
 from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, CoupledParameters, chain, skew_chain, unpack

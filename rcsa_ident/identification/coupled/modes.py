@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.coupled.parameters import DIRECTIONS, EVERY_PAIR, CoupledLayout, CoupledParameters, pack, unpack
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit

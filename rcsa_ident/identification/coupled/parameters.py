@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
     PLACE_UNIT,

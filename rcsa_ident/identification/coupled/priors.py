@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rcsa_ident.arrays import frozen
+from rcsa_ident.base.arrays import frozen
 from rcsa_ident.identification.coupled.parameters import EVERY_PAIR, CoupledLayout
 from rcsa_ident.identification.parameters import DAMPING_UNIT, lower_triangle
 from rcsa_ident.identification.priors import PriorRows, Priors

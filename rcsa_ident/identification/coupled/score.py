@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.parameters import DIRECTIONS, EVERY_PAIR, CoupledLayout, pack, side_by_side
 from rcsa_ident.identification.parameters import Layout, lower_triangle, unpack

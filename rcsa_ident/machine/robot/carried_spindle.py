@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.structure import Structure
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.errors import InputError
 
 #: Directions in which its modes move: translation and slope in X, then in Y.
 _BENDING = 4

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.robot.inertia import gravity_torques
 from rcsa_ident.machine.robot.kinematics import posed
 from rcsa_ident.machine.robot.model import RobotModel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.machine.robot import _kernels
 from rcsa_ident.machine.robot.kinematics import PosedChain, posed
 from rcsa_ident.machine.robot.model import RobotModel

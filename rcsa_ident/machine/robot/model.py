@@ -9,9 +9,9 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
-from rcsa_ident.errors import InputError, non_negative, positive
-from rcsa_ident.shown import Shown
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, non_negative, positive
+from rcsa_ident.base.shown import Shown
 
 #: How far from square, or from a unit length, given axes may be.
 _ROUNDED = 1e-6

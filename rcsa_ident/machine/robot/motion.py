@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.machine.robot import _kernels
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.inertia import torques

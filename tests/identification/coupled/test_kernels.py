@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.identification._frf_kernels import cross_frf, cross_frf_gradient
+from rcsa_ident.identification._kernels.frf import cross_frf, cross_frf_gradient
 from rcsa_ident.identification.coupled._kernels import (
     ArmArrays,
     LineArrays,

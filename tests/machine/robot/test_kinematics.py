@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.robots import turn_of
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.settings.robots import turn_of
 from rcsa_ident.machine.robot.kinematics import flange_at, postures_of, tool_point_at
 from rcsa_ident.machine.robot.model import Frame, turned_within
 from tests.fixtures.robots import KR600, TABLE_7, robot

@@ -1,0 +1,1 @@
+"""A tooling from the sound of its free ring-down."""

@@ -1,0 +1,1 @@
+"""FRFs, lobes and forces as tables, and hammer tests."""

@@ -1,0 +1,1 @@
+"""Programs, paths and meshes."""

@@ -1,0 +1,1 @@
+"""Recordings of any format, and what their files say of themselves."""

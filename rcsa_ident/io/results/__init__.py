@@ -1,0 +1,1 @@
+"""What is written once something was identified or learnt, and read again."""

@@ -1,0 +1,1 @@
+"""What people write: campaigns, toolings, cuts, machines, robots, modes."""

@@ -1,0 +1,1 @@
+"""What is cut with what, and how: toolings, workpieces, cuts."""

@@ -1,0 +1,1 @@
+"""What one recording says of itself: speed, lines, foreign tones, decays."""

@@ -1,0 +1,1 @@
+"""Loops of the methods, arrays and scalars alone."""

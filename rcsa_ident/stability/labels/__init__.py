@@ -1,0 +1,1 @@
+"""Tested cuts teach: noise of labels, posterior, next test."""

@@ -1,0 +1,208 @@
+"""What labelled cuts teach: draws of the tip, of the coefficients and of the limit's smooth error that agree with the labels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import logsumexp
+
+from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.stability.labels.adaptive_importance import adaptive_importance, systematic
+from rcsa_ident.stability.labels.label_noise import LabelNoise
+from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts
+from rcsa_ident.stability.labels.uncertain_tip import DrawnLimits
+
+#: Draws of the limit's smooth error over which a likelihood is averaged, and moves that each kept draw's error makes in the end.
+_ERRORS, _MOVES = 256, 30
+#: Effective draws below which an answer is called suspect.
+FEWEST = 30.0
+
+#: Of z, shape (d, size), and speeds, shape (n,) [rad/s].
+Limits = Callable[[FloatArray, FloatArray], DrawnLimits]
+
+
+@dataclass(frozen=True, slots=True)
+class LabelModel:
+    """How labels hang on limits; its numbers were fixed on forty real cuts (docs/labelled_cuts.md)."""
+
+    noise: LabelNoise = field(default_factory=LabelNoise)
+    discrepancy: LimitDiscrepancy = field(default_factory=LimitDiscrepancy)
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """Draws of the first round, of each further one, number of these, and draws that are kept.
+
+    A draw costs a limit at every speed that was tested.
+    """
+
+    first: int = 1000
+    further: int = 400
+    rounds: int = 3
+    kept: int = 300
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelPosterior:
+    """Draws that stand for what is believed after the labels, each as probable as the other.
+
+    Parameters
+    ----------
+    z : array, shape (r, size)
+        Numbers of the uncertain tip.
+    speeds : array, shape (n,) [rad/s]
+        Tested ones, rising; none before the first label.
+    error : array, shape (r, n)
+        Of the logarithm of the limit, at these speeds.
+    log_evidence : float
+        Logarithm of the probability of all labels before they were seen.
+    effective : float
+        Draws with equal weights that would tell as much as the weighted ones that these were chosen from.
+    """
+
+    z: FloatArray
+    speeds: FloatArray
+    error: FloatArray
+    log_evidence: float
+    effective: float
+
+    def __post_init__(self) -> None:
+        for name in ("z", "speeds", "error"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        if self.error.shape != (len(self.z), self.speeds.size) or len(self.z) == 0:
+            raise InputError("error", self.error.shape, f"one or more draws, and shape {(len(self.z), self.speeds.size)}")
+
+    def errors(self, discrepancy: LimitDiscrepancy, at: FloatArray, seed: int = 1) -> FloatArray:
+        """Return each draw's error of the log limit at speeds, shape (r, m)."""
+        return discrepancy.given(self.speeds, self.error, at, np.random.default_rng(seed))
+
+
+def learn_labels(
+    limits: Limits,
+    size: int,
+    cuts: TestedCuts,
+    model: LabelModel,
+    rng: np.random.Generator,
+    effort: Effort | None = None,
+    first: FloatArray | None = None,
+) -> LabelPosterior:
+    """Return what is believed after labels.
+
+    Parameters
+    ----------
+    limits : callable
+        Of numbers that are standard normal before the labels.
+    size : int
+        How many numbers.
+    cuts : TestedCuts
+        May be none.
+    model : LabelModel
+    rng : numpy.random.Generator
+    effort : Effort, optional
+    first : array, shape (n, size), optional
+        The first round, drawn from the prior, where its limits are known already.
+
+    Notes
+    -----
+    The error d of the log limit costs nothing to draw, the limits of a tip do: importance sampling learns where to draw tips, and each
+    tip's likelihood is the mean over many errors, so that tip and error are weighted together. Tips are then drawn by their weights, an
+    error for each by its share, and the errors move on by elliptical slices [murray2010], for which no limit has to be computed again.
+    """
+    effort = effort or Effort()
+    speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
+    if not speeds.size:
+        return LabelPosterior(rng.standard_normal((effort.kept, size)), speeds, np.zeros((effort.kept, 0)), 0.0, float(effort.kept))
+    start = rng.standard_normal((effort.first, size)) if first is None else first
+    root = model.discrepancy.root(speeds)
+    number = _even_normals(speeds.size, rng)
+    joint = _Joint(model.noise, cuts, place)
+    known: list[DrawnLimits] = []
+
+    def log_likelihood(z: FloatArray) -> FloatArray:
+        known.append(limits(z, speeds))
+        return _mean(joint.of_all(known[-1], number @ root.T))
+
+    found = adaptive_importance(log_likelihood, start, rng, effort.further, effort.rounds)
+    chosen = systematic(found.weight, effort.kept, rng)
+    drawn = DrawnLimits(*(np.concatenate([getattr(part, name) for part in known])[chosen] for name in ("log_limit", "chatter")))
+    own = joint.of_all(drawn, number @ root.T)
+    share = np.exp(own - logsumexp(own, axis=1, keepdims=True))
+    first = np.array([rng.choice(_ERRORS, p=each / each.sum()) for each in share])
+    moved = elliptical_slices(number[first], lambda u: joint.of_each(drawn, u @ root.T), rng, _MOVES)
+    order = rng.permutation(effort.kept)
+    return LabelPosterior(found.z[chosen][order], speeds, (moved @ root.T)[order], found.log_evidence, found.effective)
+
+
+def _even_normals(size: int, rng: np.random.Generator) -> FloatArray:
+    """Standard normals whose mean is 0 and whose covariance is 1 to the last digit: a mean over them errs in higher moments alone."""
+    half = rng.standard_normal((_ERRORS // 2, size))
+    both = np.concatenate([half, -half])
+    if size >= _ERRORS // 2:
+        return both
+    root = np.linalg.cholesky(both.T @ both / _ERRORS)
+    found: FloatArray = np.linalg.solve(root, both.T).T
+    return found
+
+
+def _mean(log_values: FloatArray) -> FloatArray:
+    found: FloatArray = logsumexp(log_values, axis=1) - np.log(log_values.shape[1])
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Joint:
+    """Log probability of labels of tips and errors."""
+
+    noise: LabelNoise
+    cuts: TestedCuts
+    place: FloatArray
+
+    def of_all(self, tips: DrawnLimits, error: FloatArray) -> FloatArray:
+        """Of each tip with each error, shapes (d, n), (e, n) -> (d, e)."""
+        found = np.zeros((len(tips.log_limit), len(error)))
+        for k, at in enumerate(self.place):
+            margin = tips.log_limit[:, at, None] + error[:, at]
+            found += self.noise.log_likelihood(self.cuts.at_places(np.array([k])), margin[..., None])
+        return found + self._heard(tips)[:, None]
+
+    def of_each(self, tips: DrawnLimits, error: FloatArray) -> FloatArray:
+        """Of each tip with its own error, shapes (d, n), (d, n) -> (d,)."""
+        return self.noise.log_likelihood(self.cuts, (tips.log_limit + error)[:, self.place]) + self._heard(tips)
+
+    def _heard(self, tips: DrawnLimits) -> FloatArray:
+        return self.noise.heard(self.cuts, tips.chatter[:, self.place])
+
+
+def elliptical_slices(
+    number: FloatArray, log_likelihood: Callable[[FloatArray], FloatArray], rng: np.random.Generator, moves: int
+) -> FloatArray:
+    """Return standard normal numbers after moves that leave their posterior as it is, every row by itself [murray2010].
+
+    Parameters
+    ----------
+    number : array, shape (r, n)
+    log_likelihood : callable
+        Of such an array, returns shape (r,).
+    rng : numpy.random.Generator
+    moves : int
+    """
+    here, value = number.copy(), log_likelihood(number)
+    for _ in range(moves):
+        other = rng.standard_normal(here.shape)
+        least = value + np.log(rng.random(len(here)))
+        angle = 2.0 * np.pi * rng.random(len(here))
+        low, high = angle - 2.0 * np.pi, angle.copy()
+        left = np.ones(len(here), dtype=bool)
+        while left.any():
+            turned = here * np.cos(angle)[:, None] + other * np.sin(angle)[:, None]
+            there = log_likelihood(turned)
+            done = left & (there > least)
+            here[done], value[done] = turned[done], there[done]
+            left &= ~done
+            low, high = np.where(left & (angle < 0.0), angle, low), np.where(left & (angle >= 0.0), angle, high)
+            angle = np.where(left, low + (high - low) * rng.random(len(here)), 0.0)
+    return here

@@ -1,0 +1,1 @@
+"""Loops of removal and of the march along a path, arrays and scalars alone."""

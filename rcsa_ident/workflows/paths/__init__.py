@@ -1,0 +1,1 @@
+"""A tool along a path: one use case a file."""
