@@ -13,13 +13,13 @@ import numpy as np
 
 from benchmarks.study_table import AIMS
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.io.curves.tips import read_frf_csv, read_tip
 from rcsa_ident.io.settings.machines import MachineFile
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.simulations import true_name
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.stability.tip_modes import TIP
-from rcsa_ident.base.units import to_hz
 
 FREQUENCY = np.arange(600.0, 4000.1, 5.0)
 #: Half-widths of the bands in standard deviations.

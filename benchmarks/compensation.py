@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import once, row
+from rcsa_ident.front.samples import sample_robot, sample_tooling
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.kinematics import tool_point_at
 from rcsa_ident.machine.robot.model import RobotModel
-from rcsa_ident.front.samples import sample_robot, sample_tooling
 from rcsa_ident.toolpath.blending import Controller, FirstOrderLag, QuadraticBlend
 from rcsa_ident.toolpath.forces import ForceAlongPath
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces, mirrored_postures, reached
 from rcsa_ident.workflows.paths.robot import IdealForce, Method, Mirror, RobotPath, compensate
+from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces, mirrored_postures, reached
 
 POSTURE = np.radians([0.0, 20.0, 30.0, 10.0, -40.0, 0.0])
 #: Of the two sides of the published slot [N], its feed [m/s], and what the controller leaves of its corner [m].

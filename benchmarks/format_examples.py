@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.curves.exports import write_receptances_uff
-from rcsa_ident.io.recordings.hdf5 import write_hdf5
+from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.paths.meshes import write_mesh
+from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.recordings.readers import read_signals
-from rcsa_ident.base.units import from_hz
 from tests.fixtures import recording_formats as formats
 from tests.fixtures.by_hand import flange_file, result_text
 from tests.fixtures.tool_library import END_MILL, library

@@ -32,10 +32,10 @@ from typer.testing import CliRunner
 from benchmarks.machines import turned_sample
 from benchmarks.rough_machines import rough_campaign
 from rcsa_ident.cli import app
+from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.robots import robot_keys
 from rcsa_ident.io.toml_text import toml_of
-from rcsa_ident.front.samples import simulate_campaign
 from tests.fixtures.hit import write_hit
 from tests.fixtures.rung_tooling import rung_tooling
 from tests.identification.arm.robots import sheet

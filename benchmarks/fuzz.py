@@ -28,6 +28,7 @@ from typing import Any, NoReturn
 
 from benchmarks.fuzz_changes import CHANGES, bytes_changed
 from benchmarks.fuzz_readers import TARGETS, Target, refusals
+from tests.fixtures.kept_kernels import kernel_files
 
 #: Processor time and memory of a call that is a find, and what a call is given at most.
 MOST_SECONDS, MOST_MEGABYTES, LONGEST = 5.0, 1000.0, 100_000
@@ -125,8 +126,7 @@ class _Turn:
         import atheris
 
         # the compiler of the kernels knows no other instructions than Python's
-        kernels = [*_ROOT.glob("rcsa_ident/**/_*kernels.py"), *_ROOT.glob("rcsa_ident/**/_exponentials.py")]
-        names = [".".join(path.relative_to(_ROOT).with_suffix("").parts) for path in kernels]
+        names = [".".join(path.relative_to(_ROOT).with_suffix("").parts) for path in kernel_files(_ROOT / "rcsa_ident")]
         with atheris.instrument_imports(include=list(_WATCHED), exclude=names):
             self._warm()
         change = CHANGES[self.target.kind]

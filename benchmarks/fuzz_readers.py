@@ -98,8 +98,8 @@ def _uff(path: Path) -> None:
 
 def _frfs(path: Path) -> None:
     from rcsa_ident.base.errors import InputError
-    from rcsa_ident.io.curves.tips import read_frf_csv, read_tip
     from rcsa_ident.io.curves.frf_files import read_frfs
+    from rcsa_ident.io.curves.tips import read_frf_csv, read_tip
 
     for read in (read_frf_csv, read_tip):
         try:
@@ -139,8 +139,8 @@ def _tapped(raw: bytes, folder: Path) -> None:
 
 def _tooling(raw: bytes, folder: Path) -> None:
     from rcsa_ident.io.settings.setups import tooling_of
-    from rcsa_ident.io.toml_text import keys_of_toml
     from rcsa_ident.io.settings.toolings import tooling_keys, tooling_text
+    from rcsa_ident.io.toml_text import keys_of_toml
     from rcsa_ident.report.drawing import tooling_svg
 
     tooling = tooling_of(keys_of_toml(raw.decode("utf-8", "replace"), "tooling"), "given", "T")
@@ -366,11 +366,11 @@ TARGETS: Mapping[str, Target] = {
     "tooling": Target(_tooling, seeds.written(seeds.toolings), "toml"),
     "campaign": Target(_campaign, seeds.written(seeds.campaigns), "toml"),
     "machine": Target(_machine, seeds.of_repository("data/machines/hpm.toml", "data/machines/stiff.toml"), "toml"),
-    "modes": Target(_of_keys(f"{_IO}.modes", "modes_of"), seeds.texts(seeds.OBLIQUE), "toml"),
-    "robot": Target(_of_keys(f"{_IO}.robots", "robot_of"), seeds.of_repository("data/robots/tx200.toml"), "toml"),
+    "modes": Target(_of_keys(f"{_IO}.settings.modes", "modes_of"), seeds.texts(seeds.OBLIQUE), "toml"),
+    "robot": Target(_of_keys(f"{_IO}.settings.robots", "robot_of"), seeds.of_repository("data/robots/tx200.toml"), "toml"),
     "cases": Target(_file(".toml", _cases), seeds.written(seeds.cases), "toml"),
-    "workpiece": _small(".toml", "workpiece", "dynamometer", "read_workpiece"),
-    "stickouts": Target(_by_path(".toml", f"{_IO}.stickouts", "read_stickouts", (0.05, 0.07)), seeds.written(seeds.toolings), "toml"),
+    "workpiece": _small(".toml", "workpiece", "settings.dynamometer", "read_workpiece"),
+    "stickouts": Target(_by_path(".toml", f"{_IO}.settings.stickouts", "read_stickouts", (0.05, 0.07)), seeds.written(seeds.toolings), "toml"),
     "result": Target(_result, seeds.written(seeds.results), "json"),
     "learnt": Target(_learnt, seeds.written(seeds.learnts), "json"),
     "robot-result": Target(_robot_result, seeds.written(seeds.robot_results), "json"),
@@ -379,21 +379,21 @@ TARGETS: Mapping[str, Target] = {
     "library-zip": Target(_library, seeds.written(seeds.zipped_library)),
     "gcode": Target(_tool_path(".nc"), seeds.written(seeds.programs), "text"),
     "path": Target(_tool_path(".csv"), seeds.texts(seeds.PLACES), "text"),
-    "cuts": Target(_text(f"{_IO}.tested_cuts", "tested_cuts_of"), seeds.of_repository("api/examples/CUTS.csv"), "text"),
-    "lobes": _small(".csv", "lobes", "lobes", "read_lobes"),
-    "flange": Target(_text(f"{_IO}.flanges", "flange_machine_of"), seeds.written(seeds.flanges), "text"),
-    "forces": _small(".csv", "forces", "forces", "read_forces"),
+    "cuts": Target(_text(f"{_IO}.settings.tested_cuts", "tested_cuts_of"), seeds.of_repository("api/examples/CUTS.csv"), "text"),
+    "lobes": _small(".csv", "lobes", "curves.lobes", "read_lobes"),
+    "flange": Target(_text(f"{_IO}.curves.flanges", "flange_machine_of"), seeds.written(seeds.flanges), "text"),
+    "forces": _small(".csv", "forces", "curves.forces", "read_forces"),
     "path-forces": Target(_file(".csv", _path_forces), seeds.texts(seeds.SMALL["path-forces"]), "text"),
     "postures": Target(_file(".csv", _posture_file), seeds.texts(seeds.SMALL["postures"]), "text"),
-    "static": _small(".csv", "static", "robot_static", "read_static_tests", 2),
-    "motion-csv": _small(".csv", "motion-csv", "robot_records", "read_joint_record"),
-    "motion-mat": Target(_by_path(".mat", f"{_IO}.robot_records", "read_joint_record"), seeds.written(seeds.motion)),
-    "engagement": _small(".csv", "engagement", "engagements", "read_engagement_map"),
-    "spindle": _small(".csv", "spindle", "spindle_drives", "read_spindle_drive"),
+    "static": _small(".csv", "static", "settings.robot_static", "read_static_tests", 2),
+    "motion-csv": _small(".csv", "motion-csv", "recordings.robot_records", "read_joint_record"),
+    "motion-mat": Target(_by_path(".mat", f"{_IO}.recordings.robot_records", "read_joint_record"), seeds.written(seeds.motion)),
+    "engagement": _small(".csv", "engagement", "settings.engagements", "read_engagement_map"),
+    "spindle": _small(".csv", "spindle", "settings.spindle_drives", "read_spindle_drive"),
     "stl": Target(_mesh(".stl"), seeds.surfaces("stl")),
     "obj": Target(_mesh(".obj"), seeds.surfaces("obj"), "text"),
     "ply": Target(_mesh(".ply"), seeds.surfaces("ply")),
-    "urdf": Target(_by_path(".urdf", f"{_IO}.urdf", "read_urdf", (1e6,)), seeds.written(seeds.urdfs), "text"),
+    "urdf": Target(_by_path(".urdf", f"{_IO}.settings.urdf", "read_urdf", (1e6,)), seeds.written(seeds.urdfs), "text"),
     "frames": Target(_frames, seeds.frames),
     "multipart": Target(_multipart, seeds.forms),
     "headers": Target(_headers, seeds.headers),

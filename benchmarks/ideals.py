@@ -26,14 +26,14 @@ from benchmarks.comparison import FREQUENCY, coverage, in_deviations, relative_e
 from benchmarks.machines import random_machine
 from benchmarks.page import append_row, read_rows
 from benchmarks.study import read_cut, warm
+from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
-from rcsa_ident.io.settings.machines import STEADY, MachineFile, read_machine
 from rcsa_ident.io.results.parts import read_result, write_result
+from rcsa_ident.io.settings.machines import STEADY, MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.setup.machining_setup import Campaign, Workpiece
-from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.virtual.changes import REFERENCE_SPEED, Changes, ChipLaw, JointChanges, Turn, Warming, changed

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.base.units import from_rpm
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 
 #: Draws of the prior, without softening; random orders.
 POOL, ORDERS = 6000, 10

@@ -24,6 +24,7 @@ from benchmarks.label_scores import ORDERS, POOL, SOFTENING, Score
 from benchmarks.labelled_cuts_page import Findings, write_page
 from benchmarks.real_files import DOWN, FILES
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess
@@ -36,9 +37,8 @@ from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, Labe
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.next_test import most_telling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.labels.uncertain_tip import DrawnLimits, TipLimits, UncertainTip
-from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
+from rcsa_ident.stability.tip_modes import TipModes
 
 CUTS, TRAINING = (FILES / f"labelled_cuts_{name}.csv" for name in ("118", "training_40"))
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "labelled_cuts.md"

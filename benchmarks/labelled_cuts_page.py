@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.label_scores import ORDERS, POOL, SOFTENING, Score
-from rcsa_ident.stability.labels.label_posterior import LabelModel
 from rcsa_ident.base.units import from_rpm
+from rcsa_ident.stability.labels.label_posterior import LabelModel
 
 Pair = tuple[Score, Score]
 _NOT_MEASURED = "Not measured yet."

@@ -18,12 +18,12 @@ from scipy.optimize import minimize
 from benchmarks.listening_records import draw, speeds_to_tell
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm, to_hz
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.signals.listening import listen, stands_beside
-from rcsa_ident.signals.sound.asynchronous_lines import OffOrders
 from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.sound.asynchronous_lines import OffOrders
 from rcsa_ident.signals.sound.speed_search import rotation_near
-from rcsa_ident.base.units import from_rpm, to_hz
 from rcsa_ident.workflows.listen import listen_to
 
 #: Seeds that the odds were fitted to, and the first one of those that judge them.

@@ -26,16 +26,16 @@ from benchmarks.machines import CONDITIONS, named
 from benchmarks.page import append_row, read_rows
 from benchmarks.study import Run, machine_of, perform
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.io.results.identifications import machine_from_json
-from rcsa_ident.io.settings.machines import MachineFile
 from rcsa_ident.io.results.parts import read_result
+from rcsa_ident.io.settings.machines import MachineFile
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.stability.lobes import stability_lobes

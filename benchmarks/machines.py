@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
@@ -23,7 +24,6 @@ from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import TIP
-from rcsa_ident.base.units import from_hz
 from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.workflows.simulate import true_receptances
 

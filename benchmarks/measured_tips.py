@@ -20,6 +20,7 @@ import numpy as np
 
 from benchmarks.machines import named, random_machine
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.units import from_hz, from_rpm
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
@@ -30,7 +31,6 @@ from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.tip_modes import TIP, fitted_modes
-from rcsa_ident.base.units import from_hz, from_rpm
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 OMEGA, SPEEDS, DEEPEST = from_hz(np.arange(100.0, 5001.0)), from_rpm(np.linspace(4000.0, 14_000.0, 9)), 30e-3

@@ -93,6 +93,8 @@ def main(arguments: list[str]) -> None:
 def own_tests(module: str) -> str:
     """Return the file of tests that belongs to a module: of rcsa_ident/coupling/_kernels.py it is tests/coupling/test_kernels.py."""
     package, *rooms, name = Path(module).with_suffix("").parts
+    if rooms[-1:] == ["_kernels"]:
+        rooms, name = rooms[:-1], f"{name}_kernels"
     return str(Path("tests", *(["api"] if package == "api" else []), *rooms, f"test_{name.lstrip('_')}.py"))
 
 

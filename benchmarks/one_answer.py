@@ -24,15 +24,15 @@ import numpy as np
 from typer.testing import CliRunner
 
 from api.client import Client
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cli import app
 from rcsa_ident.cutting.stock import Immersion
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
 from rcsa_ident.io.results.parts import layout, plain, read_result
 from rcsa_ident.io.settings.setups import read_tooling
-from rcsa_ident.setup.machining_setup import CutSpec
 from rcsa_ident.report.summaries import advice_summary
-from rcsa_ident.base.units import from_rpm
+from rcsa_ident.setup.machining_setup import CutSpec
 from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import ToolChange
 from tests.api.identifying import carried

@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks.timing import row
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
@@ -25,7 +26,6 @@ from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.base.units import from_rpm
 from rcsa_ident.workflows.paths.milling import mill_path
 from rcsa_ident.workflows.paths.removal import field_of, remove_along
 from rcsa_ident.workflows.paths.stability import cuts_along, stations_along

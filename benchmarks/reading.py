@@ -87,6 +87,7 @@ def write(path: Path, seconds: float) -> None:
 
 def judge(path: Path) -> str:
     """Return the verdict on the recording, and whatever else was said."""
+    from rcsa_ident.base.units import rpm
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
     from rcsa_ident.cutting.cutter import Cutter
@@ -95,7 +96,6 @@ def judge(path: Path) -> str:
     from rcsa_ident.setup.machining_setup import Cut
     from rcsa_ident.signals.measurement import measure_cut
     from rcsa_ident.signals.recording import Quantity, Sensor
-    from rcsa_ident.base.units import rpm
 
     names = [f"ch{i + 1}" for i in range(4)] if path.suffix == ".wav" else NAMES
     kinds = [(Quantity.DISPLACEMENT, 1e4)] * 2 + [(Quantity.ACCELERATION, 1e-3)] * 2

@@ -20,11 +20,11 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.io.curves.frf_files import Source, read_tap_tests
 from rcsa_ident.machine.known_tip import measured_tip
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict, tally
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict, tally
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 

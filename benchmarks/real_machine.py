@@ -19,12 +19,12 @@ import numpy as np
 
 from benchmarks.dynamometer import FILES
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.io.curves.frf_files import read_frfs
 from rcsa_ident.io.curves.hammer import read_hammer_test
 from rcsa_ident.io.settings.setups import read_campaign
-from rcsa_ident.base.units import from_hz
 from rcsa_ident.workflows.identify import data_of, hammer_lines
 
 HAMMER = FILES / "hammer"

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.machines import random_machine, true_tip
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.force import CuttingCoefficients
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
@@ -32,7 +33,6 @@ from rcsa_ident.stability.advice import highest_removal
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.operating_point import OperatingPoint
-from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.virtual.limit import multiplier, true_limit
 from rcsa_ident.virtual.reduction import Poles, poles, reduced
 from rcsa_ident.virtual.rotor import rotor

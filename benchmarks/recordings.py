@@ -18,10 +18,10 @@ from threadpoolctl import threadpool_limits
 from benchmarks import dynamometer
 from benchmarks.dynamometer import FILES
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Quantity
-from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.workflows.listen import listen_to
 
 #: What is told, by the file's name: a sound of six teeth.

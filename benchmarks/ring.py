@@ -21,6 +21,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.machines import random_machine
 from benchmarks.rings import RATE, Room, alone, hanging, sound
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.ring.ringing import UNKNOWNS, RungTooling, _assembly, _whole_tool, learned, prior_std
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
@@ -28,7 +29,6 @@ from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.signals.sound.ring_down import ring_down
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.spread import Spread
-from rcsa_ident.base.units import from_hz
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 TOOLINGS = Path(__file__).parents[1] / "data" / "machines" / "toolings"

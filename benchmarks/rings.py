@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.tool_holder.free_modes import Motion, bare, damped_poles, rod_modes
@@ -20,7 +21,6 @@ from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.model import free_body
 from rcsa_ident.tool_holder.taper import taper
 from rcsa_ident.tool_holder.timoshenko import hutchinson
-from rcsa_ident.base.units import from_hz, to_hz
 
 RATE = 48_000.0
 

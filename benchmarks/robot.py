@@ -15,13 +15,13 @@ import numba
 import numpy as np
 
 from benchmarks.timing import Race, best_of, row
+from rcsa_ident.front.samples import sample_robot, sample_tooling
 from rcsa_ident.machine.robot import _kernels as kernels
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.inertia import accelerations, mass_matrix, torques
 from rcsa_ident.machine.robot.kinematics import posed
 from rcsa_ident.machine.robot.model import Chain
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
-from rcsa_ident.front.samples import sample_robot, sample_tooling
 
 #: Postures in a loop.
 MANY = 1000

@@ -25,13 +25,13 @@ import scipy.optimize
 
 from benchmarks.robot_machines import CUT, EVALUATION, NEVER_CUT, campaign, drawn, known, postures, toolings
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.arm.result import RobotIdentification
 from rcsa_ident.io.recordings.readers import read_cut
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.setup.machining_setup import Tooling
-from rcsa_ident.base.units import from_hz
 from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.workflows.identify import judge
 from rcsa_ident.workflows.identify_robot import identify_robot

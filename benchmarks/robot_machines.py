@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import Map
+from rcsa_ident.base.units import from_rpm
+from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.io.settings.machines import MachineFile, RobotSetup, read_machine
 from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.io.settings.setups import read_tooling
@@ -22,8 +24,6 @@ from rcsa_ident.io.settings.simulations import write_robot_campaign
 from rcsa_ident.machine.robot.kinematics import postures_of
 from rcsa_ident.machine.robot.model import Body, Frame, RobotModel
 from rcsa_ident.setup.machining_setup import Tooling
-from rcsa_ident.base.scaleout import Map
-from rcsa_ident.base.units import from_rpm
 from rcsa_ident.virtual.machine import CutPlan
 from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.workflows.simulate import simulate_robot

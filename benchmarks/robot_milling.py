@@ -18,8 +18,8 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.front.samples import sample_robot
+from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.toolpath.march import Carrier, Cut, March, mill_block
 from rcsa_ident.toolpath.surface import roughness
 from rcsa_ident.toolpath.walls import Walls

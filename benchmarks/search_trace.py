@@ -25,10 +25,10 @@ from benchmarks.page import append_row, draw_searches, read_rows, write_block
 from benchmarks.study import campaign_folder, machine_of, read_data, truth_folder, warm
 from benchmarks.yardstick import SHARE, Yardstick
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import NoiseWeightedCost, PaperGeneticAlgorithm

@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -27,7 +28,6 @@ from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TipModes
-from rcsa_ident.base.units import to_rpm
 
 DEEPEST = 20e-3
 SHARES = (0.0, 0.05, 0.5, 0.95, 1.0)

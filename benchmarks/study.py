@@ -41,19 +41,19 @@ from benchmarks.machines import (
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block, write_rows
 from benchmarks.study_table import coupled_table, line, sensors_table, table
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.front.compile_kernels import STEPS
+from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
-from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
-from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.recordings.readers import read_recording
+from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
 from rcsa_ident.io.results.parts import read_result, write_result
+from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.setup.machining_setup import Campaign, Cut
-from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Quantity, Recording
-from rcsa_ident.front.compile_kernels import STEPS
 from rcsa_ident.workflows.identify import Method, clock_error, data_of, judge, left_out
 
 MACHINES = Path(__file__).resolve().parent.parent / "data" / "machines"

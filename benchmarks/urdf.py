@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import Race, best_of, row
+from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.io.settings.urdf import read_urdf
 from rcsa_ident.machine.robot.inertia import gravity_torques, mass_matrix
 from rcsa_ident.machine.robot.kinematics import flange_at, posed
-from rcsa_ident.front.samples import sample_robot
 from tests.io.urdf_files import random_urdf, urdf_of
 
 #: Arms whose parts stand anyhow.

@@ -12,6 +12,7 @@ import scipy.linalg
 from benchmarks.forces import closed_lines, cylinder_lines
 from benchmarks.removal import FLAT, beside, cuts, leaning_turns
 from benchmarks.validation import Case, Measure
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.cutting.calibration import mean_force_matrix
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
@@ -31,7 +32,6 @@ from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
 from rcsa_ident.stability.surface_error import surface_location_error
 from rcsa_ident.toolpath.march import Carrier, Cut, march, start_of
 from rcsa_ident.toolpath.walls import NOTHING, Walls
-from rcsa_ident.base.units import to_hz
 from tests.cutting import test_force
 from tests.observer import test_kalman
 from tests.oracles import literature, naive

@@ -15,13 +15,13 @@ import numpy as np
 
 from benchmarks import dynamometer, labelled_cuts, real_files, real_machine, recordings
 from benchmarks.validation import Case, Measure
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.io.recordings.readers import read_cut
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.io.uff import read_uff
 from rcsa_ident.signals.listening import Heard, Listening
 from rcsa_ident.signals.tap import tap
-from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.workflows.calibrate import calibrate
 from tests.signals.test_real_recordings import CUTS as CUTS_HEARD
 

@@ -14,8 +14,8 @@ from benchmarks.validation import Case, Measure
 from benchmarks.validation_files import CUTS, FILES, HAMMER, calibrated
 from benchmarks.validation_stability import peak, robot_row
 from benchmarks.validation_study import MISSED
-from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.front.samples import sample_robot
+from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.toolpath.march import mill_block
 from rcsa_ident.toolpath.surface import roughness
 from rcsa_ident.workflows.paths.robot_milling import arm_carrier, feed_turn

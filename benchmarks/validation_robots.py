@@ -10,13 +10,13 @@ import numpy as np
 from benchmarks.compensation import POSTURE, tight
 from benchmarks.robot import GRAVITY, pinocchio
 from benchmarks.validation import Case, Measure
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.identification.arm.design import Reach, payload_mass, plan_postures
 from rcsa_ident.machine.robot.compliance import sag, static_compliance
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques, mass_matrix, torques
 from rcsa_ident.machine.robot.kinematics import flange_at, posed, postures_of, tool_point_at
-from rcsa_ident.front.samples import sample_robot
-from rcsa_ident.base.units import to_hz
 from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces, mirrored_postures, reached
 from tests.fixtures.robots import BENT, KR600, STRETCHED, TABLE_7
 from tests.machine.robot import test_kinematics, test_posed_robot

@@ -14,8 +14,8 @@ from rcsa_ident.cutting.deflection import deflected_edge, deflected_process
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.front.samples import sample_robot
+from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod

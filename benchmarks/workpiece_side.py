@@ -25,8 +25,10 @@ from benchmarks.machines import CUT, HELD_OUT, MARGIN, true_tip, under
 from benchmarks.page import append_row, read_rows, write_block
 from benchmarks.study import machine_of, read_cut
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.result import Identification
@@ -34,11 +36,9 @@ from rcsa_ident.io.settings.machines import MachineFile
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.io.settings.stickouts import read_stickouts
 from rcsa_ident.setup.machining_setup import CutSpec, Tooling
-from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import TipModes
-from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
 from rcsa_ident.virtual.workpiece_side import SideMode, VirtualWorkpieceSide

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 from rcsa_ident.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from rcsa_ident.base.errors import InputError
+    from rcsa_ident.base.units import hz, rpm
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.cutting.conditions import Engagement
     from rcsa_ident.cutting.cutter import Cutter
@@ -26,32 +28,8 @@ if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Coordinate, Dof
     from rcsa_ident.dynamics.modal import normal_modes
     from rcsa_ident.dynamics.receptance import Receptance
-    from rcsa_ident.base.errors import InputError
-    from rcsa_ident.io.curves.tips import read_tip
-    from rcsa_ident.io.curves.forces import read_forces
-    from rcsa_ident.io.curves.lobes import read_lobes
-    from rcsa_ident.io.recordings.readers import read_recording
-    from rcsa_ident.io.results.robot_results import read_robot_result
-    from rcsa_ident.io.settings.robots import read_robot
-    from rcsa_ident.io.settings.setups import read_campaign, read_tooling
-    from rcsa_ident.machine.known_tip import KnownTip
-    from rcsa_ident.machine.robot.flexible import FlexibleRobot
-    from rcsa_ident.machine.robot.posed_robot import PosedRobot
-    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
     from rcsa_ident.front.recorded import listen, ring, tap
     from rcsa_ident.front.samples import sample_robot, sample_tooling
-    from rcsa_ident.signals.recording import Quantity, Sensor
-    from rcsa_ident.stability.full_discretisation import FullDiscretisation
-    from rcsa_ident.stability.lobes import stability_lobes
-    from rcsa_ident.stability.multi_frequency import MultiFrequency
-    from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
-    from rcsa_ident.stability.stability_map import stability_map
-    from rcsa_ident.stability.surface_error import surface_location_error
-    from rcsa_ident.stability.time_domain import TimeDomain
-    from rcsa_ident.stability.tip_modes import TipModes
-    from rcsa_ident.stability.zero_order import ZeroOrder
-    from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, clamped
-    from rcsa_ident.base.units import hz, rpm
     from rcsa_ident.front.verbs import (
         advise,
         connect,
@@ -64,6 +42,28 @@ if TYPE_CHECKING:
         read_tap_tests,
         sample_campaign,
     )
+    from rcsa_ident.io.curves.forces import read_forces
+    from rcsa_ident.io.curves.lobes import read_lobes
+    from rcsa_ident.io.curves.tips import read_tip
+    from rcsa_ident.io.recordings.readers import read_recording
+    from rcsa_ident.io.results.robot_results import read_robot_result
+    from rcsa_ident.io.settings.robots import read_robot
+    from rcsa_ident.io.settings.setups import read_campaign, read_tooling
+    from rcsa_ident.machine.known_tip import KnownTip
+    from rcsa_ident.machine.robot.flexible import FlexibleRobot
+    from rcsa_ident.machine.robot.posed_robot import PosedRobot
+    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+    from rcsa_ident.signals.recording import Quantity, Sensor
+    from rcsa_ident.stability.full_discretisation import FullDiscretisation
+    from rcsa_ident.stability.lobes import stability_lobes
+    from rcsa_ident.stability.multi_frequency import MultiFrequency
+    from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
+    from rcsa_ident.stability.stability_map import stability_map
+    from rcsa_ident.stability.surface_error import surface_location_error
+    from rcsa_ident.stability.time_domain import TimeDomain
+    from rcsa_ident.stability.tip_modes import TipModes
+    from rcsa_ident.stability.zero_order import ZeroOrder
+    from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, clamped
 
 __all__ = [
     "MATERIALS",
@@ -128,6 +128,8 @@ __all__ = [
 
 #: Where each name lives, as the block above says it to editors.
 _ROOMS = {
+    "base.errors": ("InputError",),
+    "base.units": ("hz", "rpm"),
     "cutting.coefficients": ("CuttingCoefficients",),
     "cutting.conditions": ("Engagement",),
     "cutting.cutter": ("Cutter",),
@@ -137,20 +139,23 @@ _ROOMS = {
     "dynamics.coordinates": ("Coordinate", "Dof"),
     "dynamics.modal": ("normal_modes",),
     "dynamics.receptance": ("Receptance",),
-    "errors": ("InputError",),
-    "io.curves": ("read_tip",),
-    "io.forces": ("read_forces",),
-    "io.lobes": ("read_lobes",),
-    "io.recordings": ("read_recording",),
-    "io.robot_results": ("read_robot_result",),
-    "io.robots": ("read_robot",),
-    "io.setups": ("read_campaign", "read_tooling"),
+    "front.recorded": ("listen", "ring", "tap"),
+    "front.samples": ("sample_robot", "sample_tooling"),
+    "front.verbs": (
+        "advise", "connect", "estimate_forces", "identify", "plot_lobes", "read_machine", "read_modes", "read_result", "read_tap_tests",
+        "sample_campaign",
+    ),
+    "io.curves.forces": ("read_forces",),
+    "io.curves.lobes": ("read_lobes",),
+    "io.curves.tips": ("read_tip",),
+    "io.recordings.readers": ("read_recording",),
+    "io.results.robot_results": ("read_robot_result",),
+    "io.settings.robots": ("read_robot",),
+    "io.settings.setups": ("read_campaign", "read_tooling"),
     "machine.known_tip": ("KnownTip",),
     "machine.robot.flexible": ("FlexibleRobot",),
     "machine.robot.posed_robot": ("PosedRobot",),
-    "machining_setup": ("CutSpec", "Tooling"),
-    "recorded": ("listen", "ring", "tap"),
-    "samples": ("sample_robot", "sample_tooling"),
+    "setup.machining_setup": ("CutSpec", "Tooling"),
     "signals.recording": ("Quantity", "Sensor"),
     "stability.full_discretisation": ("FullDiscretisation",),
     "stability.lobes": ("stability_lobes",),
@@ -162,11 +167,6 @@ _ROOMS = {
     "stability.tip_modes": ("TipModes",),
     "stability.zero_order": ("ZeroOrder",),
     "tool_holder.geometry": ("MATERIALS", "BeamSegment", "Contact", "clamped"),
-    "units": ("hz", "rpm"),
-    "verbs": (
-        "advise", "connect", "estimate_forces", "identify", "plot_lobes", "read_machine", "read_modes", "read_result", "read_tap_tests",
-        "sample_campaign",
-    ),
 }  # fmt: skip
 _HOME = {name: f"rcsa_ident.{room}" for room, names in _ROOMS.items() for name in names}
 

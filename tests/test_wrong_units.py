@@ -9,8 +9,8 @@ import pytest
 
 import rcsa_ident as ri
 from rcsa_ident.base import plausibility as table
-from rcsa_ident.cutting.conditions import Block, EngagementMap, Stepover
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.conditions import Block, EngagementMap, Stepover
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.verdict import examined
 from rcsa_ident.stability.lobes import stability_lobes

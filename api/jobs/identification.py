@@ -20,8 +20,10 @@ from api.stores.jobs import Applied, Job, Outcome
 from api.work import tasks
 from api.work.machine_cache import starts
 from api.work.requests import anonymous
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import Map
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.method import Method
@@ -32,9 +34,7 @@ from rcsa_ident.identification.task import Task
 from rcsa_ident.io.results.identifications import identification_to_json
 from rcsa_ident.io.results.parts import check_result, layout, plain
 from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest
-from rcsa_ident.base.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, among_fellows
-from rcsa_ident.base.units import to_hz
 from rcsa_ident.workflows.identify import ReadCut, ReadTest, data_of, hammer_lines, judge_cut, left_out, mode_deviations, of_campaign
 
 log = logging.getLogger("rcsa_ident.jobs")

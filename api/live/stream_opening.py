@@ -24,8 +24,8 @@ from api.work.pool import Work
 from api.work.requests import MachineText, ToolingSource
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.base.units import from_rpm
+from rcsa_ident.signals.recording import Quantity, Sensor
 
 #: Fewest revolutions to design an observer from.
 REVOLUTIONS = 12

@@ -11,16 +11,16 @@ import numpy as np
 from api.reading.campaign_text import Upload, campaign_of_text
 from api.reading.samples import read_normalised, write_normalised
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.recordings.readers import read_signals, recorded
-from rcsa_ident.setup.machining_setup import Campaign, Cut
 from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import to_rpm
+from rcsa_ident.io.recordings.readers import read_signals, recorded
 from rcsa_ident.report.summaries import recording_rows
+from rcsa_ident.setup.machining_setup import Campaign, Cut
 from rcsa_ident.signals.measurement import Reading, fits_by_chance, judge_air, measure_cut
 from rcsa_ident.signals.motion import measured_axes
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.sweep import judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode, Verdict
-from rcsa_ident.base.units import to_rpm
 from rcsa_ident.workflows.identify import read_of
 
 #: A campaign's files come one after the other, each with its whole text.

@@ -12,13 +12,13 @@ import numpy as np
 
 from api.reading.campaign_text import Upload, campaign_of_text
 from api.reading.examine import with_client_name
-from rcsa_ident.dynamics.receptance import MeasuredCurve, assumed_of
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.dynamics.receptance import MeasuredCurve, assumed_of
 from rcsa_ident.io.curves.hammer import read_hammer_test
 from rcsa_ident.setup.machining_setup import HammerTest
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.verdict import RecordCode
-from rcsa_ident.base.units import to_hz
 from rcsa_ident.workflows.identify import hammer_lines
 
 _ID, _FREQUENCY, _REAL, _IMAGINARY, _ASSUMED = "id", "frequency_hz", "real", "imaginary", "assumed"

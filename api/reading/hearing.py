@@ -14,6 +14,7 @@ from api.work.requests import ToolingSource
 from api.work.toolings import keys_of, parsed, tooling_from, weigh
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm, to_hz
 from rcsa_ident.io.curves.exports import write_tap
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.io.recordings.self_describing_tables import OpenRecording
@@ -23,7 +24,6 @@ from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.spectra import envelope, mean_spectrum, spectrogram
 from rcsa_ident.signals.tap import HitEstimator, TapFrf
-from rcsa_ident.base.units import from_rpm, to_hz
 from rcsa_ident.workflows.listen import listen_to
 from rcsa_ident.workflows.ring import ring_tooling
 from rcsa_ident.workflows.tap import tap_recordings

@@ -15,9 +15,9 @@ from api.schemas.versions import Difference
 from api.security import Guarded, WhoAsks
 from api.stores.entities import digest_of
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.io.settings.tested_cuts import tested_cuts_of
 from rcsa_ident.io.unread_columns import left_aside, reading_tables
-from rcsa_ident.base.units import to_rpm
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
 CSV = "text/csv"

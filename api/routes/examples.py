@@ -15,9 +15,9 @@ from api.schemas.libraries import Example, Examples
 from api.security import Guarded
 from api.transfer.archives import zipped, zipped_bytes
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.sample_files import sample_robots
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.io.toml_text import read_toml
-from rcsa_ident.base.sample_files import sample_robots
 
 router = APIRouter(prefix="/examples", tags=["examples"], route_class=Guarded)
 _FOLDER = Folder(__file__).resolve().parents[1] / "examples"

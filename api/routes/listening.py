@@ -22,8 +22,8 @@ from api.security import Guarded, WhoAsks
 from api.transfer.body_stream import announced_length, append, check_room, complete, new_part, refuse_encoded, storage_problems
 from api.transfer.multipart import FORM, form
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.recordings.open_recording import TEXT
 from rcsa_ident.base.plausibility import RATE, SENSOR_MASS, SPINDLE_SPEED
+from rcsa_ident.io.recordings.open_recording import TEXT
 
 router = APIRouter(tags=["listen"], route_class=Guarded)
 BINARY, CSV, UFF, JSON = "application/octet-stream", "text/csv", "application/x-uff", "application/json"

@@ -12,10 +12,10 @@ from api.schemas.common import Answer, Body, Id, Line
 from api.schemas.queries import Angle, Depth, Percent, Tooling, Turn
 from api.schemas.toolings import EXAMPLE
 from api.work.forces import ForceQuestion, WornQuestion
-from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 from rcsa_ident.base.units import from_rpm
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 
 MOST_CHANNELS = 32
 #: Sampling rates of a stream [Hz]; those of a file may be higher.

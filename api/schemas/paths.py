@@ -12,11 +12,11 @@ from api.schemas.queries import OnMachine, OnRobot, Rpm, Tooling
 from api.schemas.robot_queries import Coordinate
 from api.schemas.toolings import EXAMPLE
 from api.work.paths import PathRequest
-from rcsa_ident.cutting.stock import Immersion
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm
+from rcsa_ident.cutting.stock import Immersion
 from rcsa_ident.setup.machining_setup import CutSpec
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.base.units import from_rpm
 
 Millimetre = Annotated[float, Field(ge=1e-6, le=100.0)]
 _SHOWN: dict[str, Any] = {"tooling": EXAMPLE, "block_mm": [0.0, 0.0, -20.0, 60.0, 40.0, 0.0]}

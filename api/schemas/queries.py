@@ -15,16 +15,16 @@ from api.schemas.robots import Posed
 from api.schemas.tips import TappedTip
 from api.schemas.toolings import EXAMPLE, ToolingKeys
 from api.work.requests import AdviceRequest, LobeRequest, TipRequest
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, INDENTATION, POWER, RUNOUT, SIDE, SPINDLE_SPEED, TORQUE, WEAR_LAND
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.conditions import Block, Engagement
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 from rcsa_ident.io.settings.engagements import engagement_map_of
 from rcsa_ident.setup.machining_setup import CutSpec
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, INDENTATION, POWER, RUNOUT, SIDE, SPINDLE_SPEED, TORQUE, WEAR_LAND
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.base.units import from_rpm
 
 MOST_TOOLINGS, MOST_SPEEDS, MOST_TESTED = 12, 5000, 1000
 Angle = Annotated[float, Field(ge=0.0, le=180.0)]

@@ -13,10 +13,10 @@ from api.work.forces import ReadPair, observed
 from api.work.machine_cache import read
 from api.work.requests import MachineText, ToolingSource
 from api.work.toolings import tooling_from
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 from rcsa_ident.base.units import to_hz, to_rpm
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 def plan() -> tuple[str, dict[str, str]]:
     """Return campaign.toml, and the texts of all toolings of the sample machine by name: those that cut come first."""
+    from rcsa_ident.front.samples import sample_machine
     from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.io.settings.simulations import campaign_text
-    from rcsa_ident.front.samples import sample_machine
 
     machine = sample_machine()
     texts = {path.stem: path.read_text(encoding="utf-8") for path in (*machine.toolings, *machine.truth_toolings)}
@@ -19,9 +19,9 @@ def plan() -> tuple[str, dict[str, str]]:
 
 def make_cut(number: int, cut: Path, air: Path) -> None:
     """Write the recordings of a cut, in the order of campaign.toml, and sync them to the disk."""
+    from rcsa_ident.front.samples import sample_machine
     from rcsa_ident.io.recordings.hdf5 import write_hdf5
     from rcsa_ident.io.settings.setups import read_tooling
-    from rcsa_ident.front.samples import sample_machine
     from rcsa_ident.workflows.simulate import simulate
 
     machine = sample_machine()

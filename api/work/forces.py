@@ -13,11 +13,11 @@ import numpy as np
 from api.work.machine_cache import is_result, read
 from api.work.requests import MachineText, ToolingSource
 from api.work.toolings import tooling_from, weigh
-from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz, to_rpm
+from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.signals.recording import Recording, Sensor
-from rcsa_ident.base.units import to_hz, to_rpm
 
 #: Buckets of an answer's envelope, and most samples of one answer.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000

@@ -10,15 +10,15 @@ import numpy as np
 
 from api.work.requests import MachineText
 from api.work.robots import is_posed, posed
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
 from rcsa_ident.io.curves.flanges import flange_machine_of
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import check_result
 from rcsa_ident.machine.machine import LOWEST, Machine
-from rcsa_ident.base.units import from_hz, to_hz
 
 #: What the service takes; the largest campaigns stay far below.
 HIGHEST_HZ, MOST_MODES, MOST_UNKNOWNS, MOST_RIVALS, MOST_BANDS, MOST_TOLD = 20_000.0, 60, 600, 20, 20, 200

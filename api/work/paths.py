@@ -19,11 +19,12 @@ from api.work.robots import is_posed, posed
 from api.work.toolings import tooling_from, weigh
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.settings.engagements import write_engagement
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.io.paths.gcode import gcode_of
 from rcsa_ident.io.paths.meshes import mesh_of
 from rcsa_ident.io.paths.path_tables import columns_text, milling_columns, place_columns, stability_columns
 from rcsa_ident.io.paths.tool_paths import PROGRAMS, tool_path_of
+from rcsa_ident.io.settings.engagements import write_engagement
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.lobes import DRAWS
@@ -31,7 +32,6 @@ from rcsa_ident.stability.methods import method_named
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.toolpath.dexel import DexelField, Surface, memory_of
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.base.units import to_hz
 from rcsa_ident.workflows.paths.milling import mill_path
 from rcsa_ident.workflows.paths.removal import STEP, default_cell, field_of, remove_along, solid_of
 from rcsa_ident.workflows.paths.stability import cuts_along, described, stations_along

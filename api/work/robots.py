@@ -13,13 +13,13 @@ from api.work.requests import LobeRequest, ToolingSource, TooLong
 from api.work.toolings import tooling_from, weigh
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.io.settings import robots as files
 from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.model import RobotModel
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.report.robot_view import arm_geometry
-from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.workflows.robot_postures import at_posture, following, limits_along
 
 #: Largest text of a robot, joints of one, and springs across the axis of each: more axes than three turn nothing.

@@ -15,13 +15,13 @@ from api.work.requests import AdviceRequest, LobeRequest, MachineText, TipReques
 from api.work.tips import is_tapped, tapped
 from api.work.toolings import tooling_from, weigh
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz, to_rpm
+from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.io.curves.tips import write_tip_csv
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.report.summaries import advice_summary, frf_summary, lobes_curves, lobes_summary
 from rcsa_ident.stability.methods import Watch
-from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import TipAnswer, ToolChange, spread_seconds
 from rcsa_ident.workflows.tool_change import tooltip as ask_tip

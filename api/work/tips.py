@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.curves.frf_files import Source, read_tapped_tip
 from rcsa_ident.machine.known_tip import KnownTip
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import change_of, cut_of, drive_of, numbers, share_of, speeds_of, subjects_of
 from rcsa_ident.cli.lobes import Plot, check_plot
 from rcsa_ident.cli.options import Bands, CutOptions, DriveOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.base.units import from_rpm, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -188,8 +188,8 @@ def _name_tests(
     """Tell which cuts to test next."""
     from rcsa_ident.cli.learn import believed_of
     from rcsa_ident.io.settings.tested_cuts import read_candidates
-    from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.stability.labels.tested_cuts import TestedCuts
+    from rcsa_ident.stability.methods import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts, next_tests
 
     spec = cut_of(cut)

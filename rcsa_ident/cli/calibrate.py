@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 
 if TYPE_CHECKING:
-    from rcsa_ident.setup.machining_setup import Campaign
     from rcsa_ident.report.comparison import MeanForces
+    from rcsa_ident.setup.machining_setup import Campaign
     from rcsa_ident.workflows.calibrate import Calibrated
 
 #: Factor from SI to the file's units.
@@ -65,10 +65,10 @@ def calibrate(
     """Find cutting and edge coefficients from dynamometer records of cuts at several feeds."""
     from functools import partial
 
-    from rcsa_ident.cutting.signal_fit import Dynamometer
     from rcsa_ident.base.errors import positive
-    from rcsa_ident.io.settings.dynamometer import write_workpiece
+    from rcsa_ident.cutting.signal_fit import Dynamometer
     from rcsa_ident.io.recordings.readers import read_cut
+    from rcsa_ident.io.settings.dynamometer import write_workpiece
     from rcsa_ident.io.settings.setups import read_campaign
     from rcsa_ident.setup.machining_setup import Workpiece
     from rcsa_ident.workflows.calibrate import calibrate as run

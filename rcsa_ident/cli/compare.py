@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile, ToolingFile
-from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,9 +48,9 @@ def compare(
     """Show a hammer test of the idle machine beside the dynamics identified in process."""
     import numpy as np
 
+    from rcsa_ident.base.errors import InputError, positive
     from rcsa_ident.cli.results import read_machine, tell
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.base.errors import InputError, positive
     from rcsa_ident.io.curves.hammer import labelled, read_hammer
     from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.compare import Place

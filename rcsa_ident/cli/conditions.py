@@ -6,10 +6,10 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcsa_ident.cli.options import CutOptions, DriveOptions, SpeedOptions, Stock, Strategy, TipOptions
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import counted
 from rcsa_ident.base.units import from_rpm, inclusive
+from rcsa_ident.cli.options import CutOptions, DriveOptions, SpeedOptions, Stock, Strategy, TipOptions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -254,8 +254,8 @@ def feed_angle(text: str) -> float:
 
 def drive_of(options: DriveOptions) -> SpindleDrive:
     """Return what the spindle has."""
-    from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.base.errors import positive
+    from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.io.settings.spindle_drives import read_spindle_drive
 
     given = (

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_hz, to_hz
+from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 
 if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Dof

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_hz, to_hz
+from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -126,12 +126,12 @@ def axial(
 
     import numpy as np
 
+    from rcsa_ident.base.errors import positive
     from rcsa_ident.cli.conditions import frf_source
     from rcsa_ident.cli.results import read_identified
-    from rcsa_ident.base.errors import positive
-    from rcsa_ident.io.results.axial_flanges import axial_to_json
     from rcsa_ident.io.curves.flanges import read_flange_machine, write_flange_machine
     from rcsa_ident.io.curves.frf_files import read_tap_tests
+    from rcsa_ident.io.results.axial_flanges import axial_to_json
     from rcsa_ident.io.results.parts import write_result
     from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.decouple import axial_flange_from_tap

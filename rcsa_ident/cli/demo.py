@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, read_tests, result_of, search, warn_left_out
 from rcsa_ident.cli.processes import Processes
 from rcsa_ident.front.processes import Workers, workers
-from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.identification.result import Identification
-    from rcsa_ident.setup.machining_setup import Campaign, Tooling
     from rcsa_ident.report.html import ToolingPage
+    from rcsa_ident.setup.machining_setup import Campaign, Tooling
 
 #: Where predicted and true tooltip FRFs are compared [Hz].
 COMPARED = (600.0, 4000.0, 5.0)
@@ -125,12 +125,12 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     import numpy as np
 
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io.curves.tips import write_tip_csv
     from rcsa_ident.io.curves.lobes import write_lobes
+    from rcsa_ident.io.curves.tips import write_tip_csv
     from rcsa_ident.machine.known_tip import measured_tip
-    from rcsa_ident.setup.machining_setup import CutSpec
     from rcsa_ident.report.html import ToolingPage
     from rcsa_ident.report.summaries import entries_of
+    from rcsa_ident.setup.machining_setup import CutSpec
     from rcsa_ident.stability.lobes import stability_lobes
     from rcsa_ident.workflows.advise import advise
     from rcsa_ident.workflows.tool_change import ToolChange, tooltip

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rcsa_ident.base import units
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile
 from rcsa_ident.cli.results import read_identified, tell
-from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
     from rcsa_ident.dynamics.modal import ModalModel
@@ -65,7 +65,7 @@ def export(
 ) -> None:
     """Write tip FRFs, flange FRFs or modes for other programs."""
     from rcsa_ident.base.errors import positive
-    from rcsa_ident.io.curves.tips import exports
+    from rcsa_ident.io.curves import exports
     from rcsa_ident.io.settings.setups import read_tooling
 
     writable(out)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
-from rcsa_ident.cli.options import Strategy
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.options import Strategy
 
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import Machine
-    from rcsa_ident.setup.machining_setup import Tooling
     from rcsa_ident.observer.wear import WearIndicators
+    from rcsa_ident.setup.machining_setup import Tooling
     from rcsa_ident.signals.recording import Sensor
     from rcsa_ident.workflows.estimate_forces import MonitoredCut
 

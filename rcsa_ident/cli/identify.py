@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.cli.common import (
     BAD_INPUT,
     NOT_CONVERGED,
@@ -23,10 +25,8 @@ from rcsa_ident.cli.common import (
     writable,
 )
 from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.status import Status
 from rcsa_ident.front.processes import Workers
-from rcsa_ident.base.units import to_hz, to_rpm
+from rcsa_ident.identification.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import counted
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import cut_of, idle_tip, share_of
 from rcsa_ident.cli.options import CutOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.cli.processes import Processes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.front.processes import workers
-from rcsa_ident.base.remarks import counted
 from rcsa_ident.stability.methods import MethodName
 
 if TYPE_CHECKING:

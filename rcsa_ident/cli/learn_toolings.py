@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import NOT_CONVERGED, Stages, emit, say, warn, writable
 from rcsa_ident.cli.conditions import frf_source
 from rcsa_ident.cli.identify import read_and_judge, read_tests
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.front.processes import workers
 
 #: Numbers from which on an exponent is easier to read.

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import Json, Stages, answers, emit, say, writable
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, writable
 
 
 class Listened(StrEnum):

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, from_rpm, inclusive, to_hz, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import change_of, cut_of, share_of, subjects_of
 from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.cli.results import read_machine
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.units import from_hz, from_rpm, inclusive, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ToolingFile, check_plot
-from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray
@@ -49,9 +49,9 @@ def remove(
     json_: Json = False,
 ) -> None:
     """Take out of the stock what the tool sweeps along the path, and tell where its edges are in the material."""
-    from rcsa_ident.io.settings.engagements import write_engagement
     from rcsa_ident.io.paths.meshes import check_mesh_name, write_mesh
     from rcsa_ident.io.paths.tool_paths import read_tool_path
+    from rcsa_ident.io.settings.engagements import write_engagement
     from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.paths.removal import field_of, remove_along
 

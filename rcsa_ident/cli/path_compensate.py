@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ToolingFile
 from rcsa_ident.cli.robot import is_robot
-from rcsa_ident.base.errors import InputError, positive
 
 if TYPE_CHECKING:
     from rcsa_ident.setup.machining_setup import Tooling

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import counted
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import subjects_of
 from rcsa_ident.cli.lobes import check_plot
 from rcsa_ident.cli.options import TipOptions, takes_groups
 from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
 from rcsa_ident.cli.robot import is_robot, posed_robot
-from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.base.remarks import counted
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.base.units import from_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import TipSource

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import engagement, feed_angle
 from rcsa_ident.cli.options import Strategy
-from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.base.units import from_rpm, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -155,8 +155,8 @@ def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, s
     from rich.table import Table
 
     from rcsa_ident.cli.tables import show
-    from rcsa_ident.io.settings.cuts import cut_keys
     from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.settings.cuts import cut_keys
     from rcsa_ident.io.toml_text import toml_of
 
     names = [f"{each.tooling}-pass-{i:02d}" for i, each in enumerate(planned.passes, start=1)]
@@ -240,8 +240,8 @@ def _coefficients(data: dict[str, Any], where: str) -> CuttingCoefficients:
     from dataclasses import replace
 
     from rcsa_ident.cutting.force import SLOPES
-    from rcsa_ident.io.validated_table import Table
     from rcsa_ident.io.settings.workpieces import workpiece_of
+    from rcsa_ident.io.validated_table import Table
 
     given = workpiece_of(Table(data, where).table("workpiece")).coefficients
     found = data.get("coefficients", {})

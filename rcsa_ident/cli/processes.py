@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.front.processes import Workers, workers
 from rcsa_ident.base.scaleout import cluster_map
+from rcsa_ident.front.processes import Workers, workers
 
 Processes = Annotated[
     int | None, typer.Option(min=1, max=64, help="Number of processes; default: one per core, at most 8.", show_default=False)

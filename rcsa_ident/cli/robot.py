@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, inclusive, to_hz, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import change_of, cut_of
 from rcsa_ident.cli.lobes import Plot, ToolingFile, check_plot, tell_lobes, tell_tooltip
 from rcsa_ident.cli.options import CutOptions, SpeedOptions, takes_groups
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.units import from_hz, inclusive, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 from rcsa_ident.cli.robot import Posture, RobotFile, _angles, _arm
-from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray

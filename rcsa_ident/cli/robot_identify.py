@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.identify import read_and_judge
 from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.cli.robot import RobotFile
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.status import Status
 
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 
 
 @answers
@@ -42,8 +42,8 @@ def import_(
     """
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.settings.robots import robot_keys
-    from rcsa_ident.io.toml_text import toml_of
     from rcsa_ident.io.settings.urdf import read_urdf
+    from rcsa_ident.io.toml_text import toml_of
 
     writable(out)
     springs = _numbers(stiffness, "--stiffness-nm-per-rad", 1e-300)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.robot import RobotFile
-from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rcsa_ident.cli.common import Json, answers, emit, say, writable
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cli.common import Json, answers, emit, say, writable
 
 
 @answers

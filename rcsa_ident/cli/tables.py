@@ -12,6 +12,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_cm3_per_min, to_hz, to_rpm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
@@ -28,14 +29,13 @@ from rcsa_ident.report.summaries import (
 )
 from rcsa_ident.report.workpiece_side import side_captions, side_mode_rows
 from rcsa_ident.stability.advice import Advice, PlannedCut, SpeedWindow
+from rcsa_ident.stability.labels.tested_cuts import Tally
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.operating_point import Bound, OperatingPoint
-from rcsa_ident.stability.labels.tested_cuts import Tally
-from rcsa_ident.base.units import to_cm3_per_min, to_hz, to_rpm
 
 if TYPE_CHECKING:
-    from rcsa_ident.identification.arm.result import RobotIdentification
     from rcsa_ident.identification.arm.joints import JointFit
+    from rcsa_ident.identification.arm.result import RobotIdentification
     from rcsa_ident.identification.arm.static import StaticFit
     from rcsa_ident.workflows.learn_from_cuts import NextTest
     from rcsa_ident.workflows.robot_postures import RobotAtPosture

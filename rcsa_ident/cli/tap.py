@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 from rcsa_ident.base.errors import InputError, non_negative
 from rcsa_ident.base.units import to_hz
+from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 
 
 class Response(StrEnum):

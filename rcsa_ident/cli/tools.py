@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import BAD_INPUT, Json, answers, emit, say, warn, writable
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import counted
+from rcsa_ident.cli.common import BAD_INPUT, Json, answers, emit, say, warn, writable
 
 if TYPE_CHECKING:
     from rcsa_ident.io.settings.tool_libraries import Imported

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import SPINDLE
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 
 
 def decouple(measured: Receptance, tool_holder: Receptance, joint: LumpedJoint | None = None) -> Receptance:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.coupling.decoupling import interface_receptance
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import SPINDLE
 from rcsa_ident.coupling.smoothing import band_covariance, band_solve, bending, second_differences
 from rcsa_ident.dynamics.receptance import Receptance, dissipation
-from rcsa_ident.base.errors import InputError, positive
 
 #: Damping ratio below which no mode of the flange is expected: how fast its receptance may bend over frequency.
 LEAST_DAMPING = 0.02

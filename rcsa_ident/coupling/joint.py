@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import non_negative, positive
+from rcsa_ident.dynamics.coordinates import Dof
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 
 SPINDLE = "spindle"
 

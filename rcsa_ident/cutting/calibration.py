@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, UNIT_NAMES, unit_lines
 from rcsa_ident.cutting.regression import cluster_covariance, student_quantile
 from rcsa_ident.cutting.segments import Line
-from rcsa_ident.base.errors import InputError
 
 #: Coefficients in the order of `ForceCalibration.value`; the last two want a dynamometer that measures along the axis, or leaning edges.
 NAMES = UNIT_NAMES

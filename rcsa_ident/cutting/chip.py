@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.cutting.conditions import AnyEngagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.base.errors import InputError, positive
 
 #: Points of a piece of the outline.
 _POINTS = 65

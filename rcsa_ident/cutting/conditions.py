@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.base.errors import InputError, non_negative, positive
 from rcsa_ident.base.plausibility import HEIGHT, SIDE, STEPOVER
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.cutting.profile import Profile
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray
+from rcsa_ident.base.errors import non_negative
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.shape import CutterShape
-from rcsa_ident.base.errors import non_negative
 
 
 def has_corner(cutter: Cutter) -> bool:

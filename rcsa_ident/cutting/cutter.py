@@ -9,14 +9,14 @@ from functools import lru_cache
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.cutting.outlines import Dimensions, key_of, missing
-from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.cutting.serration import Serration
-from rcsa_ident.cutting.shape import IGNORED_CORNER, CutterShape, cylinder_remark
 from rcsa_ident.base.errors import InputError, non_negative
 from rcsa_ident.base.plausibility import DIAMETER, HELIX, RUNOUT, TEETH, Range
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Shown
+from rcsa_ident.cutting.outlines import Dimensions, key_of, missing
+from rcsa_ident.cutting.profile import Profile
+from rcsa_ident.cutting.serration import Serration
+from rcsa_ident.cutting.shape import IGNORED_CORNER, CutterShape, cylinder_remark
 
 
 class HelixKind(StrEnum):

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, non_negative, positive
 from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.base.errors import InputError, non_negative, positive
 
 #: Nodes per metre of depth, and at least so many.
 _NODES, _FEWEST = 20_000.0, 12

@@ -14,9 +14,9 @@ from itertools import permutations, product
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.calibration import ForceCalibration, calibrate_mean_force
 from rcsa_ident.cutting.force_record import ForceRecord
-from rcsa_ident.base.errors import InputError
 
 #: K_rc over K_tc of cutting metal: 0.1 to 0.7 in published tables, about 0 with sharp positive rake, its error beside.
 RATIOS = (-0.1, 1.0)

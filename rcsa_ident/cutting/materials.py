@@ -9,8 +9,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 
 _COEFFICIENTS = {
     "tangential_coefficient_mpa", "radial_ratio", "axial_ratio", "tangential_edge_n_per_mm", "radial_edge_n_per_mm", "axial_edge_n_per_mm",

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.shown import Shown
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.rows import Rows, rows_of
-from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.base.shown import Shown
 
 #: Range of rake angles for which orthogonal tests are asked at all [rad].
 _RAKE = np.radians(60.0)

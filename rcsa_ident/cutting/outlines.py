@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Shown
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.segments import ROUNDING, Arc, Line, Segment
 from rcsa_ident.cutting.shape import CutterShape
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.shown import Shown
 
 #: What libraries round a ball's radius by, as a share of it.
 _ROUNDED = 1e-3

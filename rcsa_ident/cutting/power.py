@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
-from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.plausibility import POWER, SPINDLE_SPEED, TORQUE, Range, remarks_of
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.rows import rows_of
 
 
 @dataclass(frozen=True, slots=True)

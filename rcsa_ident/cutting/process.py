@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import AnyEngagement, CuttingConditions, Engagement, EngagementProfile, feed_direction, widest
-from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.teeth import deepest
 from rcsa_ident.base.errors import InputError, non_negative
 from rcsa_ident.base.plausibility import FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, INDENTATION, WEAR_LAND, Range, remarks_of
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Shown
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import AnyEngagement, CuttingConditions, Engagement, EngagementProfile, feed_direction, widest
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.teeth import deepest
 
 
 @dataclass(frozen=True, slots=True, repr=False)

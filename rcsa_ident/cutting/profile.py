@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.cutting.segments import ROUNDING, Arc, Line, Segment
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.shown import Shown
+from rcsa_ident.cutting.segments import ROUNDING, Arc, Line, Segment
 
 #: Length of a wall whose end nobody told, in diameters: deeper than anyone cuts.
 _LONG = 10.0

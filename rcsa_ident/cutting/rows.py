@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting._kernels import chip_pieces
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.segments import Line, Segment
 from rcsa_ident.cutting.teeth import Edges, edges_at, lags
-from rcsa_ident.base.errors import InputError
 
 #: Nodes of a piece of the outline, and one more for each of these angles that its edge lags [rad]; nodes of a wave of a serrated edge.
 NODES, _LAG, WAVE = 8, 0.08, 256

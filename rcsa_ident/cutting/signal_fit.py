@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.calibration import NAMES, TOGETHER, ForceCalibration, leaning, plausible
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import unit_lines
 from rcsa_ident.cutting.force_record import ANGLES, ForceRecord
 from rcsa_ident.cutting.regression import cluster_covariance, student_quantile
-from rcsa_ident.base.errors import InputError
 
 #: From so many cuts on their scatter is asked, too.
 CUTS_FOR_SCATTER = 4

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.cutting.conditions import AnyEngagement, Block, Engagement, EngagementMap, Stepover
-from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Shown
+from rcsa_ident.cutting.conditions import AnyEngagement, Block, Engagement, EngagementMap, Stepover
+from rcsa_ident.cutting.cutter import Cutter
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.segments import Line
-from rcsa_ident.base.errors import InputError
 
 #: Below this share of the largest radius an edge of constant angle does not wind on: it would without end at the axis.
 _POLE = 0.02

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Shown
 from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.poles import PoleResidue, frequencies, pair_sum
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.shown import Shown
 
 _FREQUENCIES = "finite natural frequencies above 0 [rad/s]"
 

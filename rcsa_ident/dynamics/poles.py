@@ -9,11 +9,11 @@ from typing import Any, Self
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics._kernels import pole_sum
-from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_hz
+from rcsa_ident.dynamics._kernels import pole_sum
+from rcsa_ident.dynamics.state_space import StateSpace
 
 #: Condition number of the eigenvectors beyond which poles are taken to coincide.
 _COINCIDING = 1e12

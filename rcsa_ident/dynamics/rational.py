@@ -9,10 +9,10 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.poles import PoleResidue, pair_sum
 from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.dynamics.vector_fitting import Candidate, Problem, growing, order_of
-from rcsa_ident.base.errors import InputError
 
 #: Share of the largest part below which a residue's further rank-one parts are dropped.
 _RANK = 1e-6

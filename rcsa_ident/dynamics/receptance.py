@@ -9,10 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Drawn
+from rcsa_ident.dynamics.coordinates import Coordinate
 
 
 class MeasuredCurve(tuple[FloatArray, ComplexArray]):

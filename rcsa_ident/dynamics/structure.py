@@ -9,11 +9,11 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics._kernels import add_banded, independent_columns
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

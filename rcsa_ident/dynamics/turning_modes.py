@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Coordinate
-from rcsa_ident.dynamics.poles import PoleResidue, frequencies
-from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.poles import PoleResidue, frequencies
+from rcsa_ident.dynamics.receptance import Receptance
 
 #: How far a matrix may be from symmetric, skew or passive, as a share of its size: rounding.
 _ROUNDING = 1e-9

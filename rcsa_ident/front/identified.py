@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
+from rcsa_ident.base.shown import Drawn
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.machine import IdentifiedMachine
@@ -15,7 +16,6 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.io.results.drawings import learned_of
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
 from rcsa_ident.setup.machining_setup import Campaign
-from rcsa_ident.base.shown import Drawn
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.learnt import LearnedValue
 from rcsa_ident.workflows.identify import left_out, mode_deviations

@@ -15,25 +15,26 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Drawn, Shown
+from rcsa_ident.base.units import from_hz, to_cm3_per_min, to_rpm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.front.identified import Result
-from rcsa_ident.io.curves.tips import write_tip_csv
 from rcsa_ident.io.curves.exports import write_tap
-from rcsa_ident.io.files import write_text
 from rcsa_ident.io.curves.flanges import write_flange_machine
 from rcsa_ident.io.curves.forces import write_forces
 from rcsa_ident.io.curves.lobes import write_advice, write_lobes, write_map
-from rcsa_ident.io.settings.modes import write_modes
+from rcsa_ident.io.curves.tips import write_tip_csv
+from rcsa_ident.io.files import write_text
 from rcsa_ident.io.recordings.readers import write_recording
 from rcsa_ident.io.results.parts import write_result
+from rcsa_ident.io.settings.modes import write_modes
 from rcsa_ident.io.settings.toolings import write_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.machine import Machine
-from rcsa_ident.setup.machining_setup import Campaign, Tooling
 from rcsa_ident.observer.force import ForceEstimate
 from rcsa_ident.report import figures
 from rcsa_ident.report.advice import advice_figure
@@ -45,7 +46,7 @@ from rcsa_ident.report.listening import listening_figure
 from rcsa_ident.report.lobes import map_figure, save_figure, stability_figure, surface_figure
 from rcsa_ident.report.summaries import drawing_rows, mode_rows, two_digits
 from rcsa_ident.report.tap import tap_figure
-from rcsa_ident.base.shown import Drawn, Shown
+from rcsa_ident.setup.machining_setup import Campaign, Tooling
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.tap import TapFrf
@@ -54,7 +55,6 @@ from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
 from rcsa_ident.stability.tip_modes import TipModes
-from rcsa_ident.base.units import from_hz, to_cm3_per_min, to_rpm
 from rcsa_ident.workflows.estimate_forces import MonitoredCut
 
 Writer = Callable[[Path], object]

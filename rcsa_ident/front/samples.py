@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.sample_files import sample_data, sample_robots
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.io.settings.setups import CAMPAIGN_FILE, read_tooling
 from rcsa_ident.io.settings.simulations import Progress, SimulatedCampaign, write_simulation
 from rcsa_ident.machine.robot.model import RobotModel
 from rcsa_ident.setup.machining_setup import Tooling
-from rcsa_ident.base.sample_files import sample_data, sample_robots
-from rcsa_ident.base.scaleout import Map
 from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances, truth_speeds
 
 #: Cuts of a sample campaign that is made on the spot: three in ten of those in the repository's, and a good answer all the same.

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.setup.machining_setup import Campaign, Cut, CutSpec, Tooling
 from rcsa_ident.base.units import rpm
+from rcsa_ident.setup.machining_setup import Campaign, Cut, CutSpec, Tooling
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.dynamics.receptance import Receptance
+    from rcsa_ident.front.identified import Result
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.identification.method import Method
-    from rcsa_ident.front.identified import Result
     from rcsa_ident.machine.machine import Machine, TipSource
     from rcsa_ident.observer.tuning import ObserverMethod
     from rcsa_ident.signals.recording import Recording
@@ -57,9 +57,9 @@ def sample_campaign(folder: str | Path = "sample_runs", processes: int | None = 
     >>> sorted(campaign.toolings)
     ['S1-ER32', 'S2-PG25']
     """
-    from rcsa_ident.io.settings.setups import read_campaign
     from rcsa_ident.front.processes import workers
     from rcsa_ident.front.samples import make_sample_campaign
+    from rcsa_ident.io.settings.setups import read_campaign
 
     with _one_thread(), workers(processes, ("rcsa_ident.workflows.simulate",)) as pool, _line(progress) as line:
         return read_campaign(make_sample_campaign(folder, progress=line.counted("cut on the virtual machine"), mapper=pool.map))
@@ -108,10 +108,10 @@ def identify(
     from functools import partial
 
     from rcsa_ident.front.identified import Result
+    from rcsa_ident.front.processes import workers
     from rcsa_ident.io.curves.hammer import read_hammer_test
     from rcsa_ident.io.recordings.readers import read_cut
     from rcsa_ident.io.settings.setups import read_campaign
-    from rcsa_ident.front.processes import workers
     from rcsa_ident.workflows import identify as workflow
 
     chosen = _method(method, start)
@@ -161,7 +161,7 @@ def read_result(path: str | Path) -> Result:
     HPM sample machine: X ... modes, Y ... modes, 533 to 4266 Hz, converged
     """
     from rcsa_ident.front.identified import Result
-    from rcsa_ident.io.results.parts import parts as results
+    from rcsa_ident.io.results import parts as results
 
     return Result(results.read_result(path), str(path))
 

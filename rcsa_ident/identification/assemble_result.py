@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.cutting.force_directions import WORTH, gain_across, turned
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
@@ -30,7 +31,6 @@ from rcsa_ident.identification.result import AxisResult, Identification, Identif
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.validation import Prediction, judged, predictions, validated, widening
 from rcsa_ident.machine.flange_part import JointedFlange
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.tool_holder.drawings import KnownToolings
 
 #: Factor on the posterior's standard deviations for what no model of finitely many modes can tell of itself: on three virtual

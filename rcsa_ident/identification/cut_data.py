@@ -7,10 +7,10 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData, Turning, nodes
 from rcsa_ident.identification.made_cuts import CutPrior
 from rcsa_ident.identification.status import FEWEST_OF_HOUSING, FEWEST_TOOLINGS

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.remarks import Remark, says
 from rcsa_ident.cutting.force import ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.candidate import Candidate
@@ -22,7 +23,6 @@ from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING, FEWEST_TOOLINGS, Status
 from rcsa_ident.identification.validation import Prediction
 from rcsa_ident.machine.flange_part import JointedFlange
-from rcsa_ident.base.remarks import Remark, says
 
 #: Above this share of unexplained signal the force model or the recordings are wrong: where drawings are exact, and where they are rough.
 #: Where all else is right, noise and the finite number of modes leave 0.0005 to 0.0011 of exact drawings (docs/study.md).

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.assemble_result import CoupledFit, Fit, PlaneFit
 from rcsa_ident.identification.candidate import Candidate
@@ -48,7 +49,6 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.search import SearchSettings, explore
 from rcsa_ident.identification.sweep_correction import unswept
 from rcsa_ident.identification.task import Phase, finite, perform
-from rcsa_ident.base.scaleout import Map
 
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3

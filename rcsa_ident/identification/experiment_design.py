@@ -16,9 +16,9 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.identification._kernels.frf import cross_frf, cross_frf_gradient
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, chain, lower_triangle, residual_turn, scaled_joint, unpack

@@ -13,11 +13,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification._kernels.lines import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
@@ -25,8 +27,6 @@ from rcsa_ident.identification.progress import Progress, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase, finite, perform
-from rcsa_ident.base.remarks import Remark
-from rcsa_ident.base.scaleout import Map
 
 #: Delays that each cut is tried at, over a tooth-passing period.
 GRID = 64

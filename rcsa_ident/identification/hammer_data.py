@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.made_cuts import CutPrior

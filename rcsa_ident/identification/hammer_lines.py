@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark
+from rcsa_ident.dynamics.coordinates import Dof
 
 #: Lines that a test has at least.
 FEWEST_LINES = 20

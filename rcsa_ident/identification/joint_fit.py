@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
@@ -19,7 +20,6 @@ from rcsa_ident.identification.parameters import Layout, Unknowns, pack, planes,
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.task import Phase, finite, perform
-from rcsa_ident.base.scaleout import Map
 
 #: Modes per axis beyond what the evidence asks for.
 GROWN = 1

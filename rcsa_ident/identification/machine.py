@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.turning_modes import TurningModes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.posterior import MachineAxis, PlaneUnknowns, Posterior
 from rcsa_ident.identification.status import Status
@@ -26,7 +27,6 @@ from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.setup.machining_setup import Workpiece
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
-from rcsa_ident.base.units import to_hz
 
 #: Unknowns times frequencies up to which the machine's side of the coupling is kept: 100 bytes each, 512 where planes feel each other.
 MOST_KEPT, MOST_KEPT_OF_BOTH = 1_000_000, 200_000

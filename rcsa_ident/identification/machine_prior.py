@@ -10,8 +10,8 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, Unknowns

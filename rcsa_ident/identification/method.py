@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.base.scaleout import Map
 
 
 class Method(Protocol):

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, flange_modes, joint_of, unpack
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, OpenQuestion, Perturbation
 from rcsa_ident.machine.spindle import Spindle

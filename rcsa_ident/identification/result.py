@@ -9,11 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark, RemarkCode, says
+from rcsa_ident.base.shown import Shown
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.machine import IdentifiedMachine
@@ -24,8 +26,6 @@ from rcsa_ident.identification.validation import Prediction
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.setup.machining_setup import Workpiece
-from rcsa_ident.base.remarks import Remark, RemarkCode, says
-from rcsa_ident.base.shown import Shown
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings

@@ -12,8 +12,8 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.assemble_result import WIDER
 from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
-from rcsa_ident.identification.machine_prior import FurtherMisfit, Gaussian, KnownMachine
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
+from rcsa_ident.identification.machine_prior import FurtherMisfit, Gaussian, KnownMachine
 from rcsa_ident.identification.model_order import OUTLYING, cut_weights, evidence, model_error
 from rcsa_ident.identification.parameters import JOINT, Layout, planes
 from rcsa_ident.tool_holder.alteration import ALTERATIONS

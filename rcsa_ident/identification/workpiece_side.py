@@ -14,12 +14,12 @@ import numpy as np
 import scipy.optimize
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm, scaled_force
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.model_order import unexplained_share
 from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide, gives_way
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.measurement import CutMeasurement
 from rcsa_ident.signals.motion import workpiece_channels
 from rcsa_ident.signals.recording import Sensor

@@ -14,10 +14,10 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.io.time_base import uniform
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.recording import LONGEST, Quantity
 from rcsa_ident.signals.told_units import seconds_in
 

@@ -8,14 +8,14 @@ from typing import Self
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.poles import PoleResidue, frequencies
 from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
-from rcsa_ident.base.shown import Shown
-from rcsa_ident.base.units import to_hz
 
 #: The only direction of it.
 AXIAL = (Coordinate("flange", Dof.Z),)

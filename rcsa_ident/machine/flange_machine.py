@@ -9,15 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange, independent_parts
 from rcsa_ident.machine.machine import STEP, Machine
 from rcsa_ident.machine.measured import MeasuredFlange
-from rcsa_ident.base.units import to_hz
 
 
 @dataclass(frozen=True, eq=False, repr=False)

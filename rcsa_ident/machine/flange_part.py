@@ -14,10 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
-from rcsa_ident.base.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance, assumed_of
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.setup.machining_setup import Tooling, Workpiece
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.base.units import from_hz, to_hz
 
 #: Share of the highest frequency from which on a receptance is at its end.
 _END = 0.97

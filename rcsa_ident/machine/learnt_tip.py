@@ -15,11 +15,11 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.setup.machining_setup import Tooling, Workpiece
 from rcsa_ident.stability.labels.label_posterior import FEWEST, LabelModel, LabelPosterior
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts
+from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 from rcsa_ident.stability.tip_modes import TIP, TipModes
-from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 
 #: What is said of a posterior that few draws stand for.

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Drawn, Shown
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.mode_synthesis import poles_of
@@ -25,7 +26,6 @@ from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
 from rcsa_ident.machine.tip import Behind, Side, tip_over
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.setup.machining_setup import Tooling, Workpiece
-from rcsa_ident.base.shown import Drawn, Shown
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes
 from rcsa_ident.tool_holder.drawings import FittedDrawing, KnownToolings, fitted
 from rcsa_ident.tool_holder.geometry import ToolAssembly

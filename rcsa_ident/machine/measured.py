@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
-from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark, RemarkCode
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
+from rcsa_ident.dynamics.receptance import Receptance
 
 #: Estimated relative error of the interpolation from which on the measured grid is called coarse, and the share of the frequencies that
 #: are asked for at which it has to be: a narrow antiresonance alone changes no limit.

@@ -10,11 +10,11 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
 
 Respond = Callable[[JointedFlange, Receptance | None, FloatArray], Receptance]

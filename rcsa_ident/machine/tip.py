@@ -13,10 +13,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling._kernels import changes_of_planes, tip_changes, tips_of_planes, tips_over
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import Doubted, Places, UncertainReceptance, Variation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.drawings import FittedDrawing
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened

@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.turning_modes import TurningModes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machine.mode_synthesis import FLANGE
-from rcsa_ident.base.units import to_hz, to_rpm
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -13,14 +13,14 @@ from functools import partial
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.uncertain import Doubted, Name, Places, Spread, UncertainReceptance, Variation
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.shown import Shown
 from rcsa_ident.signals.recording import Role
-from rcsa_ident.base.units import to_hz
 
 
 def gives_way(logs: FloatArray, omega: FloatArray) -> tuple[ComplexArray, ComplexArray]:

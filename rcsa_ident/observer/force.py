@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.shown import Saved
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.observer.kalman import FilterState, KalmanFilter
 from rcsa_ident.observer.transfer_function import SampledModes, TransferFunction
-from rcsa_ident.base.shown import Saved
 
 #: What is left of the observer's start when it has settled: the settling time to 2 %.
 LEFT = 0.02

@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.base.errors import InputError, non_negative, positive
+from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.observer.transfer_function import SampledModes
 
 #: Standard deviation of every force mode before the first sample, more than a tooth brings [N], and of a disturbance's [m].

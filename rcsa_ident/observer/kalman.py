@@ -11,8 +11,8 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.observer._kernels import coupled_smoothed, coupled_steps, kalman_steps, smoothed_force
 from rcsa_ident.observer.force_model import AugmentedModel
 

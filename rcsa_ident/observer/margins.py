@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.observer.kalman import KalmanFilter
 
 #: Frequencies evenly over the band up to half the sampling rate, evenly over its decades, and beside each weakly damped pole.

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import RationalFit, rational_fit
 from rcsa_ident.dynamics.state_space import StateSpace
-from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.observer._kernels import modal_filter
 
 #: Relative rms misfit that the transfer function may have in its band.

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import unit_lines
-from rcsa_ident.base.errors import InputError, positive
 
 #: What a force consists of; shearing grows with the chip, rubbing with a worn edge.
 COEFFICIENTS = ("K_tc", "K_rc", "K_te", "K_re")

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_cm3_per_min, to_rpm
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid, letters
 from rcsa_ident.report.lobes import _CURVES, _GREEN, _RED, stability_figure
 from rcsa_ident.stability.advice import Advice, PlannedCut, UsableDepths
 from rcsa_ident.stability.operating_point import OperatingPoint
-from rcsa_ident.base.units import to_cm3_per_min, to_rpm
 
 
 class Mark(NamedTuple):

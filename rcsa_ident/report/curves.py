@@ -7,16 +7,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.report.figures import _STYLE, COLOURS, _grid, _without_jumps, letters, tooltip_frf, wide
 from rcsa_ident.report.lobes import _CURVES
 from rcsa_ident.report.summaries import entries_of
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.stability.tip_modes import TIP
-from rcsa_ident.base.units import to_hz
 
 #: Frequencies of a figure, at most about twice as many.
 MOST_LINES = 600

@@ -18,9 +18,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, MetTest
-from rcsa_ident.base.units import to_hz
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
 COLOURS = {

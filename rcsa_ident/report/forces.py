@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.observer.force import ForceEstimate
 from rcsa_ident.observer.response import FLAT, ObserverFRF, decibel
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
-from rcsa_ident.base.units import to_hz
 
 
 def force_history(

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.remarks import says
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.cutting.stock import engagement_with
@@ -19,8 +21,6 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
-from rcsa_ident.setup.machining_setup import Campaign, CutSpec, Tooling
-from rcsa_ident.base.remarks import says
 from rcsa_ident.report import figures
 from rcsa_ident.report.drawing import tooling_svg
 from rcsa_ident.report.lobes import stability_figure
@@ -36,9 +36,9 @@ from rcsa_ident.report.summaries import (
     whole_mode_rows,
 )
 from rcsa_ident.report.workpiece_side import side_captions, side_mode_rows
+from rcsa_ident.setup.machining_setup import Campaign, CutSpec, Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice
-from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.version import __version__
 
 #: A logarithm that the data leave open by more than this is not told by them.

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.spectra import envelope, mean_spectrum, spectrogram
-from rcsa_ident.base.units import to_hz, to_rpm
 
 _UNITS = {Quantity.ACCELERATION: "m/s²", Quantity.DISPLACEMENT: "m", Quantity.FORCE: "N", Quantity.SOUND: "of full scale"}
 _ORDER, _CHATTER = "#52606d", "#C8501A"

@@ -12,14 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
 from rcsa_ident.stability.advice import UsableDepths
+from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict
 from rcsa_ident.stability.operating_point import OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
-from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict
-from rcsa_ident.base.units import to_hz, to_rpm
 
 _GREY, _GREEN, _RED = "#52606d", "#00704f", "#a33f12"
 #: Marker, colour and filling of a tested cut.

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.identification.ring.ringing import UNKNOWNS, RungLine, RungTooling
 from rcsa_ident.tool_holder.alteration import fluted_segments
-from rcsa_ident.base.units import to_hz
 
 _CONTACT = {
     "translational_stiffness": "N/m per m", "rotational_stiffness": "N m/rad per m", "translational_damping": "N s/m per m",

@@ -6,10 +6,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.identification.ring.ringing import UNKNOWNS, RungTooling
 from rcsa_ident.report.figures import _STYLE, COLOURS
 from rcsa_ident.tool_holder.free_modes import Motion
-from rcsa_ident.base.units import to_hz
 
 _PRIOR, _AFTER = "#9aa5b1", "#009E73"
 

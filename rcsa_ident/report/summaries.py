@@ -10,22 +10,22 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import SHOWN, to_cm3_per_min, to_hz, to_rpm
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import ModalModel, directions
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.stability.advice import Advice, PlannedCut
 from rcsa_ident.stability.band_shares import BandShares
+from rcsa_ident.stability.labels.tested_cuts import Tally
 from rcsa_ident.stability.operating_point import HeldBack, OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.labels.tested_cuts import Tally
 from rcsa_ident.tool_holder.learnt import LearnedValue
-from rcsa_ident.base.units import SHOWN, to_cm3_per_min, to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.report.figures import _STYLE, COLOURS
 from rcsa_ident.signals.tap import TapFrf
-from rcsa_ident.base.units import to_hz
 
 
 def tap_figure(found: TapFrf) -> Figure:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.base.units import to_hz
+from rcsa_ident.machine.workpiece_side import WorkpieceSide
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, RUNOUT, SPINDLE_SPEED, remarks_of
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.shown import Saved, Shown
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients, checked_coefficient
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
@@ -18,17 +23,12 @@ from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVari
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion, engagement_with
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, RUNOUT, SPINDLE_SPEED, remarks_of
-from rcsa_ident.base.remarks import Remark
-from rcsa_ident.base.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor, untold_distances
 from rcsa_ident.tool_holder.catalogue import assumption, stated
 from rcsa_ident.tool_holder.drawings import Drawing
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.proportions import proportions
 from rcsa_ident.tool_holder.spread import UNSTATED, Spread
-from rcsa_ident.base.units import to_rpm
 
 #: Median of the positive half of a normal distribution over its standard deviation, and about the spread of its logarithm.
 HALF_NORMAL, HALF_NORMAL_SPREAD = 0.67, 0.95

@@ -12,14 +12,14 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Drawn
+from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.signals.active_segment import BAND, decimated, loud_part
+from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.sound.asynchronous_lines import OffOrders, off_orders
 from rcsa_ident.signals.sound.order_lines import FOLDED_ORDERS, UNFILTERED, OrderLines, order_lines
-from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.sound.rotation import Rotation, follow_on
 from rcsa_ident.signals.sound.speed_search import APART, HIGHEST_SHARE, TURNS, find_rotation, window_length
 from rcsa_ident.signals.verdict import RecordCode
-from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 
 #: Spindle frequencies that are looked for where nothing is told [Hz]: 300 to 48 000 rev/min.
 LOWEST, HIGHEST = 5.0, 800.0

@@ -9,14 +9,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray
+from rcsa_ident.base.errors import InputError, Unsteady
+from rcsa_ident.base.remarks import Remark, says
+from rcsa_ident.base.shown import Shown
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import SLOPES, ForceTerm, force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError, Unsteady
-from rcsa_ident.base.remarks import Remark, says
-from rcsa_ident.base.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, followed, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.listening import heard_in_a_cut
@@ -24,7 +25,6 @@ from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import SteadyRecord, steady_record
 from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, examined, raw_faults, silence, smeared, speed_faults, tooth_count_fault
-from rcsa_ident.base.units import to_hz
 
 #: Highest line that is used [Hz].
 MAX_FREQUENCY = 4300.0

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.recording import Quantity, Role, Sensor, accelerometers, first_sensor
 
 #: Where the flange's motion, gap and fixture, or the motion of one other place is all that was measured.

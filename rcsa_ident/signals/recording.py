@@ -9,11 +9,11 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.plausibility import RATE
 from rcsa_ident.base.remarks import Remark, RemarkCode
 from rcsa_ident.base.shown import Drawn
+from rcsa_ident.dynamics.coordinates import Dof
 
 #: Samples of a block, in which recordings are gone through.
 BLOCK = 1 << 18

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import Unsteady
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.active_segment import loud_part
 from rcsa_ident.signals.motion import MotionChannels, motion_channels
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.sound.rotation import Rotation, follow_changes
-from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
 from rcsa_ident.signals.sound.speed_search import rotation_near
+from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
 from rcsa_ident.signals.steady_part import steady_part, steady_window
-from rcsa_ident.base.units import to_hz
 
 #: Least number of revolutions of a steady part.
 LEAST_REVOLUTIONS = 8.0

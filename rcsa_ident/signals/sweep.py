@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals._kernels import angle_signal, angle_sums, turned
 from rcsa_ident.signals.alignment import angle_to_air, rising
-from rcsa_ident.signals.sound.line_prominence import LineGains
 from rcsa_ident.signals.measurement import (
     MAX_FREQUENCY,
     NO_AIR,
@@ -30,11 +30,11 @@ from rcsa_ident.signals.measurement import (
 )
 from rcsa_ident.signals.motion import motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording
+from rcsa_ident.signals.sound.line_prominence import LineGains
 from rcsa_ident.signals.sound.rotation import Pace, follow, speed_path
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum
 from rcsa_ident.signals.steady import SteadyRecord, record_of_lines
 from rcsa_ident.signals.verdict import RecordCode, Verdict, examined, raw_faults
-from rcsa_ident.base.units import to_hz, to_rpm
 
 #: Length of a window [s], share of its speed that it sweeps at most, and the revolutions that it holds all the same.
 WINDOW, _SWEPT, _TURNS = 0.28, 0.02, 20.0

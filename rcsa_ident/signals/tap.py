@@ -12,8 +12,8 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Drawn
-from rcsa_ident.signals.frf import coherence, h1, h2, hv
 from rcsa_ident.base.units import to_hz
+from rcsa_ident.signals.frf import coherence, h1, h2, hv
 
 #: Share of the strongest hit's force above which a sample belongs to a hit, and below which its pulse has ended.
 _HIT, _PULSE = 0.2, 0.02

@@ -11,11 +11,11 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.plausibility import RATE
 from rcsa_ident.base.remarks import Remark, RemarkCode
 from rcsa_ident.base.shown import Shown
+from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.signals.channel_scan import scan
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
-from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 
 #: Least and largest swing, peak to peak, of what a milling spindle does and a sensor tells.
 PLAUSIBLE = {Quantity.DISPLACEMENT: (2e-9, 2e-3, "m"), Quantity.ACCELERATION: (1e-4, 1e5, "m/s^2")}

@@ -8,17 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.cutting.power import SpindleDrive, spindle_load
-from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.shown import Drawn, Shown
+from rcsa_ident.base.units import to_rpm
+from rcsa_ident.cutting.power import SpindleDrive, spindle_load
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.stability.band_shares import BandShares
+from rcsa_ident.stability.labels.tested_cuts import Tally
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.operating_point import Bound, OperatingPoint, operating_point
 from rcsa_ident.stability.pockets import peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
-from rcsa_ident.stability.labels.tested_cuts import Tally
-from rcsa_ident.base.units import to_rpm
 
 #: Depths at which it is asked what a cutter with a shape takes.
 _DEPTHS = 49

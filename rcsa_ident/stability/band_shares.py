@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.shown import Shown
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.uncertain import Doubted, Name, UncertainReceptance
-from rcsa_ident.base.shown import Shown
 from rcsa_ident.stability.lobes import DEEPER, embedded, known_directions
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.stability.zero_order import ZeroOrder

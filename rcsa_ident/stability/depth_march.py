@@ -11,7 +11,7 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.teeth import edges_at
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.stability._kernels.depth_at_speed import depth as kernels
+from rcsa_ident.stability._kernels import depth as kernels
 from rcsa_ident.stability._kernels.depth_at_speed import receptance_at
 from rcsa_ident.stability.regeneration import directions_of, regeneration
 

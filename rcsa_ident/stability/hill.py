@@ -9,10 +9,10 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.forms import Directions, lines_of_rows
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability._kernels.depth_at_speed import receptance_at
 from rcsa_ident.stability.eigenvalue_tracking import Branches, Crossing, crossings_between
 from rcsa_ident.stability.regeneration import directions_of, regeneration

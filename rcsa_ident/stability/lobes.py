@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import CUTTING_SPEED, SEARCHED_DEPTH, SPINDLE_SPEED, remarks_of
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import widest
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import CUTTING_SPEED, SEARCHED_DEPTH, SPINDLE_SPEED, remarks_of
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.stability.axial_doubt import axial_doubt
 from rcsa_ident.stability.drawn_modes import drawn_tips, of_draw
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
@@ -25,7 +26,6 @@ from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes, fitted_modes, known_modes, receptance_of
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.base.units import to_rpm
 
 _ZERO_ORDER = ZeroOrder()
 #: Machines drawn from what the records leave open, each with cutting coefficients of its own.

@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.rows import Rows, rows_of
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.stability._kernels.depth_at_speed import cut as kernels
-from rcsa_ident.stability._kernels.depth_at_speed import monodromy as _monodromy_kernels, step as _step_kernels
+from rcsa_ident.stability._kernels import cut as kernels
+from rcsa_ident.stability._kernels import monodromy as _monodromy_kernels
+from rcsa_ident.stability._kernels import step as _step_kernels
 from rcsa_ident.stability.regeneration import directions_of, regeneration, regeneration_of, sliced
 from rcsa_ident.stability.tip_modes import ModeArrays, TipModes
 

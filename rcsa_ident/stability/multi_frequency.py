@@ -8,9 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.depth_march import finer, ladder, march
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
 from rcsa_ident.stability.methods import MethodName, Watch, coarse_to_fine

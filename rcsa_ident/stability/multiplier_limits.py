@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.stability.first_instability import CAREFUL, first_loss
 from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES, LOOKS, Watch, coarse_to_fine
 from rcsa_ident.stability.monodromy import RESIDUAL, MonodromyOperator, Multiplier, common_period, stable_depth_bound

@@ -7,10 +7,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from rcsa_ident.cutting.power import spindle_load
-from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_cm3_per_min, to_rpm
+from rcsa_ident.cutting.power import spindle_load
+from rcsa_ident.cutting.process import MillingProcess
 
 
 class Bound(StrEnum):

@@ -8,10 +8,10 @@ from typing import cast
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.forms import Directions, force_form, mean_over_turn, normal_form, product_form
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.rows import Rows, rows_of
-from rcsa_ident.base.errors import InputError
 
 #: Share of the radius below which the speed of a rubbing edge counts as that at this share: towards the axis it falls to nothing.
 SLOWEST = 0.1

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Drawn, Shown
-from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 
 _ARRAYS = ("spindle_speed", "limit_depth", "chatter_frequency", "lobe", "flip")
 #: What a recommendation holds back: speed right within this share, stable on this share of the possible machines and coefficients, and so

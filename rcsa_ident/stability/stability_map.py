@@ -12,16 +12,16 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.plausibility import AXIAL_DEPTH
 from rcsa_ident.base.shown import Drawn
+from rcsa_ident.base.units import to_rpm
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import asked_speeds
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import ROUGH, Growth, longest_step
 from rcsa_ident.stability.tip_modes import TipModes
-from rcsa_ident.base.units import to_rpm
 
 #: Points along the side of a block at the start.
 _BLOCK = 4

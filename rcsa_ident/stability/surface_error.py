@@ -8,6 +8,10 @@ from enum import StrEnum
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import AXIAL_DEPTH
+from rcsa_ident.base.shown import Drawn
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_lines, runout_force_lines
@@ -15,12 +19,8 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.segments import Arc
 from rcsa_ident.cutting.teeth import edges_at, lags
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import AXIAL_DEPTH
-from rcsa_ident.base.shown import Drawn
 from rcsa_ident.stability.lobes import asked_speeds
 from rcsa_ident.stability.tip_modes import TIP, TipModes
-from rcsa_ident.base.units import to_rpm
 
 #: Most multiples of the spindle frequency; where the band holds more of them, the rest is left out.
 MOST_ORDERS = 4000

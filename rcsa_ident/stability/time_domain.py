@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.rows import Places, places_of
 from rcsa_ident.cutting.teeth import edges_at
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.stability._kernels.depth_at_speed import time as kernels
+from rcsa_ident.stability._kernels import time as kernels
 from rcsa_ident.stability.first_instability import first_loss
 from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES, LOOKS, MethodName, Watch, coarse_to_fine
 from rcsa_ident.stability.monodromy import common_period, stable_depth_bound

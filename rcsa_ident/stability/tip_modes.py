@@ -9,6 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import MODE_STIFFNESS, TIP_DAMPING, TIP_FREQUENCY, TIP_STIFFNESS, remarks_of
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.shown import Saved
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.line_noise import line_noise
 from rcsa_ident.dynamics.modal import ModalModel
@@ -16,10 +20,6 @@ from rcsa_ident.dynamics.poles import PoleResidue, frequencies
 from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import MODE_STIFFNESS, TIP_DAMPING, TIP_FREQUENCY, TIP_STIFFNESS, remarks_of
-from rcsa_ident.base.remarks import Remark
-from rcsa_ident.base.shown import Saved
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import same_everywhere
 from rcsa_ident.cutting.directional import mean_directional_matrix
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability._kernels.depth_at_speed import envelope, envelopes, largest_real_part, pitch_envelope
 from rcsa_ident.stability.depth_march import Marched, finer, ladder, march, strengths
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.regeneration import check_constant
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes, receptance_of
-from rcsa_ident.base.units import to_rpm
 
 #: Teeth in the cut, on average, below which the mean directional matrix no longer tells the whole story.
 FEWEST_TEETH_IN_CUT = 1.0

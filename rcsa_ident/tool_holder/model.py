@@ -10,11 +10,11 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure, poles
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.timoshenko import (
     Section,

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.plausibility import (
     CONTACT,
@@ -24,6 +23,7 @@ from rcsa_ident.base.plausibility import (
     remarks_of,
 )
 from rcsa_ident.base.remarks import Remark
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 
 #: Each as (usual, possible): the cutter's diameter over the tool's at its tip (a fluted part is written as a thinner cylinder, a disc

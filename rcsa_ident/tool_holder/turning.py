@@ -19,11 +19,11 @@ from typing import Self
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import projection_basis
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import free_body, tool_holder_poles
 from rcsa_ident.tool_holder.timoshenko import ShearCoefficient, cowper

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Shown
+from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.toolpath._kernels.engagement import distance_at, engage_upright, leaning_arcs
 from rcsa_ident.toolpath._kernels.layer import layer_arcs, material_ahead
 from rcsa_ident.toolpath.removal import Sweep, frame_of

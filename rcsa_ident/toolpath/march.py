@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.teeth import Slices, slices_of
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.dynamics.structure import Structure
-from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.toolpath._kernels import march as kernels
 from rcsa_ident.toolpath.walls import Walls
 

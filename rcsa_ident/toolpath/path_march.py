@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath._kernels import wall as kernels
 from rcsa_ident.toolpath.march import Carrier, Cut, March, march, start_of
 from rcsa_ident.toolpath.path import ToolPath

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.segments import Arc
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.shown import Shown
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.segments import Arc
 
 #: By which the chords that stand for an arc of an outline leave it [m].
 _CHORD = 1e-7

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import AnyEngagement, Block, CuttingConditions, Engagement, Stepover
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
-from rcsa_ident.base.errors import InputError
 
 #: Levels of a wave, at least.
 _OF_A_WAVE = 24

@@ -9,10 +9,10 @@ import numpy as np
 import scipy.optimize
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, same_everywhere
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.virtual.reduction import Poles
 
 #: Longest step of the march [s].

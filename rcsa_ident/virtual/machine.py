@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.base.errors import InputError, non_negative, positive
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.tool_holder.geometry import BeamSegment
 
 #: A value for each of the machine's axes, X and Y.

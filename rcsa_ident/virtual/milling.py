@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.virtual._kernels import mill
 from rcsa_ident.virtual.changes import ChipLaw
 from rcsa_ident.virtual.levels import levels_of

@@ -10,8 +10,8 @@ import scipy.optimize
 import scipy.sparse
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.virtual.rotor import Rotor, frequency_motion
 
 #: Frequencies [Hz] at which the reduced rotor is exact.

@@ -13,8 +13,8 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.virtual.machine import PerAxis, VirtualSpindle
 from rcsa_ident.virtual.mesh import HOLDER, SHAFT, TOOL, Mesh, add_tooling, element_edges, nanometres

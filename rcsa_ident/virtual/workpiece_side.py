@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.virtual.reduction import Poles
 
 #: Point of the poles that moves with the workpiece.

@@ -9,23 +9,23 @@ from typing import TypeVar
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, SEARCHED_DEPTH, SPINDLE_SPEED
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.setup.machining_setup import BareCutter
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, SEARCHED_DEPTH, SPINDLE_SPEED
 from rcsa_ident.stability.advice import Advice, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.band_shares import BandShares, band_shares
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import Growth, longest_step
 from rcsa_ident.stability.operating_point import Bound, HeldBack, OperatingPoint, operating_point
 from rcsa_ident.stability.pockets import AROUND, least_within_tolerance, pad_speeds, speeds_around
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.proportions import edge_length
-from rcsa_ident.base.units import to_hz
 from rcsa_ident.workflows.tool_change import Fitting, ToolChange, classify_tested_cuts
 
 _UNLIMITED = SpindleDrive.flat(None, None, None)

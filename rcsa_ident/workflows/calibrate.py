@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.calibration import ForceCalibration, calibrate_mean_force, leaning, mean_force_matrix
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
@@ -15,7 +16,6 @@ from rcsa_ident.cutting.force_axes import CLEAR, AxesChoice, axes_choices
 from rcsa_ident.cutting.force_record import ForceRecord
 from rcsa_ident.cutting.signal_fit import Dynamometer, SignalCalibration, calibrate_signal
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.setup.machining_setup import Campaign, Cut
 from rcsa_ident.signals._kernels import order_sums
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor

@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.rational import rational_fit
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.workflows.contact import neighbour_noise

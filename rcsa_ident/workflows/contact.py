@@ -9,13 +9,13 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.line_noise import differences_noise, line_noise
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
-from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.cutting.force_directions import WORTH, gain_across, lines_of, turned
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.assemble_result import ANOTHER_FEED
 from rcsa_ident.identification.diagnostics import NOTHING_JUDGES, one_axis
 from rcsa_ident.setup.machining_setup import Campaign
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, Reading
-from rcsa_ident.base.units import from_hz
 
 #: Toolings that judge each other well: each is predicted by two at least.
 ENOUGH_TO_JUDGE = 3

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.coupling.flange_fit import LEAST_DAMPING, DecoupledFlange, Observation, least_squares_flange
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.responses import in_plane
 from rcsa_ident.setup.machining_setup import Tooling
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.rods import rod_poles

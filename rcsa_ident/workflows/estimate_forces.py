@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.base.errors import InputError, Unsteady
+from rcsa_ident.base.shown import Drawn
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.coupling.rcsa import SPINDLE
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError, Unsteady
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.observer.coupled_transfer import coupled_transfer
 from rcsa_ident.observer.design import AxisSettings, axis_observer, coupled_observer
@@ -23,7 +25,6 @@ from rcsa_ident.observer.response import ObserverFRF, observer_response
 from rcsa_ident.observer.transfer_function import HIGHEST, TransferFunction, transfer_function
 from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
 from rcsa_ident.observer.wear import WearIndicators, wear_indicators
-from rcsa_ident.base.shown import Drawn
 from rcsa_ident.signals.alignment import angle_to_air
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.motion import measured_axes, motion_channels
@@ -32,7 +33,6 @@ from rcsa_ident.signals.spectra import line_spectrum
 from rcsa_ident.signals.steady import SteadyRecord, steady_record
 from rcsa_ident.signals.verdict import raw_faults, speed_faults
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.base.units import to_hz, to_rpm
 
 #: The band begins this much below the lowest identified line: a model is as good a little beyond its last point.
 BELOW = 0.7

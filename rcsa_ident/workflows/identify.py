@@ -9,10 +9,13 @@ from functools import partial
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.scaleout import Map
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.cutting.corner import corner_change, has_corner
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance, assumed_of
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.cut_data import prepare
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.hammer_data import AtPoints, with_tests
@@ -32,8 +35,6 @@ from rcsa_ident.identification.rough_data import (
 )
 from rcsa_ident.identification.workpiece_side import workpiece_side
 from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest, Tooling
-from rcsa_ident.base.remarks import Remark
-from rcsa_ident.base.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.sweep import measure_pass
@@ -43,7 +44,6 @@ from rcsa_ident.tool_holder.learnt import learned
 from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
 from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.turning import turning_pair
-from rcsa_ident.base.units import from_hz
 
 #: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
 _STEP = 1e-5

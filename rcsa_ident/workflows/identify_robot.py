@@ -9,20 +9,20 @@ from functools import cached_property
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.cutting.force import axial_and_slope
 from rcsa_ident.dynamics.modal import PoleModel
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.model_order import Report
 from rcsa_ident.identification.arm.data import PosedData, check_postures, posed_data
 from rcsa_ident.identification.arm.fit import fit_robot
 from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.result import RobotCode, RobotIdentification, answer
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.model_order import Report
 from rcsa_ident.identification.rough_data import without_distances
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.setup.machining_setup import Campaign, Cut
-from rcsa_ident.base.remarks import Remark
-from rcsa_ident.base.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.rods import rod_poles
 from rcsa_ident.tool_holder.spread import EXACT

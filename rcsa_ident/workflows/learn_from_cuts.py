@@ -8,22 +8,22 @@ from functools import partial
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.machining_setup import CutSpec, Tooling
-from rcsa_ident.base.scaleout import Map
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, learn_labels
-from rcsa_ident.stability.lobes import both_directions
-from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.labels.next_test import most_telling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.tip_modes import TipModes, fitted_modes
 from rcsa_ident.stability.labels.uncertain_tip import DrawnLimits, TipLimits, UncertainTip
+from rcsa_ident.stability.lobes import both_directions
+from rcsa_ident.stability.methods import StabilityMethod
+from rcsa_ident.stability.tip_modes import TipModes, fitted_modes
 
 #: Standard deviations of what a tap test shows of each mode, over the values: frequency, damping ratio, stiffness. A turning spindle and
 #: another clamping differ by that much from what was tapped.

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.tooling_update import FurtherFit, fit_further
+from rcsa_ident.base.units import to_hz, to_rpm
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines
-from rcsa_ident.identification.machine_prior import KnownMachine
 from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.identification.machine_prior import KnownMachine
 from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.identification.tooling_update import FurtherFit, fit_further
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.setup.machining_setup import Campaign, HammerTest, Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered, fluted_segments
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.spread import SPREAD_FIELDS
-from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.workflows.identify import data_to_learn_from
 
 #: Standard deviations by which something drawn may be off before a cut is said to contradict its drawing.

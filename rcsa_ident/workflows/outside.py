@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.base.units import to_hz, to_rpm
 
 
 def outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cutting.chip import feed_for_chip
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import AnyEngagement, CuttingConditions
@@ -15,7 +17,6 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force_directions import WORTH, gain_across, lines_of, turned
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.identification.experiment_design import (
     CandidateCuts,
     Goal,
@@ -31,7 +32,6 @@ from rcsa_ident.signals.measurement import MAX_FREQUENCY, CutMeasurement
 from rcsa_ident.stability.lobes import asked_directions, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.workflows.prospects import SPACING, apart, together
 
 #: Frequencies of the receptances behind the lobes [Hz]: lowest, step.

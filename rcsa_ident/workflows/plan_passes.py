@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.plausibility import LARGEST_SWEEP, LEAST_SWEEP
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.setup.machining_setup import Tooling
-from rcsa_ident.base.plausibility import LARGEST_SWEEP, LEAST_SWEEP
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.sweep import WINDOW
-from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.workflows.plan import CutConstraints, check, limits_at
 from rcsa_ident.workflows.prospects import apart, together
 

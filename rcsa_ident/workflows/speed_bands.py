@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import Map
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.status import FEWEST_CUTS
 from rcsa_ident.setup.machining_setup import Campaign
-from rcsa_ident.base.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
-from rcsa_ident.base.units import to_rpm
 from rcsa_ident.workflows.identify import data_of
 
 

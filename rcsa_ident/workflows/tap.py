@@ -9,15 +9,15 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.dynamics.passivity import Correction, judged
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.plausibility import RATE, SENSOR_MASS
 from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.dynamics.passivity import Correction, judged
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.tap import HitEstimator, TapFrf, tap
 from rcsa_ident.signals.told_units import force_unit, is_untold, motion_unit, volts_in
 from rcsa_ident.signals.verdict import RecordCode, assumed
-from rcsa_ident.base.units import to_hz
 
 #: How many times as long as the hammer's pulses the other channels go on.
 _LONGER = 3.0

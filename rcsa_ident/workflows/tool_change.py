@@ -10,19 +10,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import SEARCHED_DEPTH, SPINDLE_SPEED
+from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.setup.machining_setup import BareCutter, CutSpec, Tooling
-from rcsa_ident.base.plausibility import SEARCHED_DEPTH, SPINDLE_SPEED
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.labels.label_noise import LabelNoise
+from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.lobes import (
     APART,
     DRAWS,
@@ -40,12 +42,10 @@ from rcsa_ident.stability.pockets import pad_speeds
 from rcsa_ident.stability.result import TOLERANCE, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
-from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.proportions import edge_length
-from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.workflows.outside import outside_band, outside_speeds
 
 #: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.

@@ -9,8 +9,8 @@ import pytest
 
 from api.work import machine_cache
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import read_frf_csv
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.io.curves.tips import read_frf_csv
 from tests.api.in_process import refused
 from tests.fixtures import by_hand, coupled_by_hand
 

@@ -21,8 +21,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.status import too_few
 from rcsa_ident.io.recordings.readers import READERS, read_cut
 from rcsa_ident.io.settings.setups import read_campaign
-from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.settings.toolings import tooling_keys
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.workflows.identify import judge_cut
 from tests.api.in_process import refused
 from tests.api.recordings import TOOLING, content, declared

@@ -26,6 +26,8 @@ from api import codec
 from api.codec import NOUNS, Unknown, _noun, decode, encode
 from api.jobs import identification, lobes, paths
 from api.work.requests import LobeRequest, MachineText, ToolingSource
+from rcsa_ident.base.plausibility import PlausibilityCode
+from rcsa_ident.base.remarks import Remark, RemarkCode
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Dof
@@ -38,8 +40,6 @@ from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.task import Phase
 from rcsa_ident.setup.machining_setup import CutSpec
-from rcsa_ident.base.plausibility import PlausibilityCode
-from rcsa_ident.base.remarks import Remark, RemarkCode
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.stream_forces import LiveObserver
 

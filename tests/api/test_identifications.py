@@ -25,8 +25,8 @@ from api.security import new_id, now
 from api.shares import Shares
 from api.stores.entities import Machine
 from api.stores.jobs import Event, Job, Outcome
-from rcsa_ident.cli import app
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cli import app
 from rcsa_ident.identification.task import Phase
 from rcsa_ident.io.recordings.readers import read_cut
 from rcsa_ident.io.settings.setups import read_campaign

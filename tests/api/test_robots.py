@@ -12,12 +12,12 @@ from api.schemas.robot_queries import MapQuery, PathQuery, PostureQuery
 from api.schemas.robots import EXAMPLE, RobotKeys
 from api.work.robots import MOST_LIMITS, MOST_PLACES, posed, posed_text, robot_from
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.io.curves.tips import read_frf_csv
 from rcsa_ident.io.settings.robots import robot_keys
 from rcsa_ident.io.settings.setups import tooling_of
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
-from rcsa_ident.base.units import from_hz
 from tests.api.in_process import BOTH, refused
 from tests.fixtures import by_hand
 from tests.fixtures.robots import ROBOTS, TABLE_7, robot

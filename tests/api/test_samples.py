@@ -11,8 +11,8 @@ import pytest
 
 from api.reading.previews import envelope, spectrum
 from api.reading.samples import blocks, length, read_normalised, write_normalised
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.readers import in_si
 from rcsa_ident.signals.recording import Quantity, Sensor
 

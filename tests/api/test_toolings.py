@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from api.work.toolings import MOST_ELEMENTS, tooling_of, weigh
-from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.toml_text import keys_of_toml, toml_of
 from rcsa_ident.tool_holder.model import tool_holder_structure

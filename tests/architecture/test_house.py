@@ -6,17 +6,18 @@ import ast
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
+
+from tests.fixtures.kept_kernels import kernel_files
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "rcsa_ident"
 SOURCES = sorted(p for folder in ("rcsa_ident", "api", "tests", "benchmarks") for p in (ROOT / folder).rglob("*.py"))
 #: Rooms whose rounding the search of an identification follows.
 SEARCHED = {"identification", "coupled", "tool_holder"}
-KERNELS = sorted(PACKAGE.rglob("_*kernels.py"))
+KERNELS = kernel_files(PACKAGE)
 
 
 def test_kernels_see_arrays_and_scalars_only():
@@ -37,31 +38,24 @@ def test_kernels_see_arrays_and_scalars_only():
         functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
         assert functions, path
         for function in functions:
-            arguments, place = function.args, f"{path.parent.name}.{function.name}"
+            arguments, place = function.args, f"{path.stem}.{function.name}"
             count = len(arguments.posonlyargs) + len(arguments.args) + len(arguments.kwonlyargs)
             assert count <= 10, f"{place} takes {count} arguments"
             for words in (ast.unparse(decorator) for decorator in function.decorator_list):
                 if "njit" in words:
                     assert "cache=True" in words, f"{place}: {words}"
                     assert "parallel" not in words, f"{place}: {words}"
-                    assert path.parent.name not in SEARCHED or "fastmath" not in words, f"{place}: {words}"
+                    assert not SEARCHED & set(path.parts) or "fastmath" not in words, f"{place}: {words}"
 
 
 def file_of_tests(path: Path) -> Path:
-    """Of ``room/_kernels.py`` they stand in ``tests/room/test_kernels.py``."""
-    return ROOT / "tests" / path.parent.relative_to(PACKAGE) / f"test{path.name}"
+    """Of ``room/_kernels.py`` they stand in ``tests/room/test_kernels.py``, of ``room/_kernels/cut.py`` in ``tests/room/test_cut_kernels.py``."""
+    within, room = path.parent.name == "_kernels", path.relative_to(PACKAGE).parent
+    return ROOT / "tests" / (room.parent / f"test_{path.stem}_kernels.py" if within else room / "test_kernels.py")
 
 
 def test_kernels_have_their_tests():
     assert not [path for path in KERNELS if not file_of_tests(path).exists()]
-
-
-def test_kernels_need_no_types():
-    """The compiler infers them: the checker is told so, file by file, since its patterns know whole names only."""
-    with (ROOT / "pyproject.toml").open("rb") as file:
-        overrides = tomllib.load(file)["tool"]["mypy"]["overrides"]
-    untyped = next(each["module"] for each in overrides if each.get("disallow_untyped_defs") is False)
-    assert sorted(untyped) == [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in KERNELS]
 
 
 def test_no_file_is_too_long():

@@ -48,24 +48,24 @@ def test_kernels_are_kept_by_their_text(tmp_path, monkeypatch):
     rooms = [tmp_path / name / "room" for name in ("first", "second")]
     for room in rooms:
         (room / "__pycache__").mkdir(parents=True)
-        (room / "_own_kernels.py").write_text("x = 1\n")
+        (room / "_kernels.py").write_text("x = 1\n")
     first, second = (room / "__pycache__" for room in rooms)
     assert not kept_kernels.restore(rooms[0].parent)
-    (first / "_own_kernels.f-1.py311.nbi").write_bytes(b"index")
-    (first / "_own_kernels.f-1.py311.1.nbc").write_bytes(b"code")
+    (first / "_kernels.f-1.py311.nbi").write_bytes(b"index")
+    (first / "_kernels.f-1.py311.1.nbc").write_bytes(b"code")
     kept_kernels.keep(rooms[0].parent)
-    os.utime(rooms[1] / "_own_kernels.py", (5.0, 5.0))
+    os.utime(rooms[1] / "_kernels.py", (5.0, 5.0))
     assert kept_kernels.restore(rooms[1].parent)
-    assert (second / "_own_kernels.f-1.py311.1.nbc").read_bytes() == b"code"
-    assert len({(room / "_own_kernels.py").stat().st_mtime for room in rooms}) == 1
-    (rooms[1] / "_own_kernels.py").write_text("x = 2\n")
-    (second / "_own_kernels.f-1.py311.2.nbc").write_bytes(b"code of the text before")
+    assert (second / "_kernels.f-1.py311.1.nbc").read_bytes() == b"code"
+    assert len({(room / "_kernels.py").stat().st_mtime for room in rooms}) == 1
+    (rooms[1] / "_kernels.py").write_text("x = 2\n")
+    (second / "_kernels.f-1.py311.2.nbc").write_bytes(b"code of the text before")
     kept_kernels.keep(rooms[1].parent)
     assert not kept_kernels.restore(rooms[1].parent)
     assert list(second.glob("*.nb[ci]")) == []
     assert kept_kernels.restore(rooms[0].parent)
     # a cache folder that cannot be written keeps nothing
-    monkeypatch.setattr(kept_kernels, "KEPT", rooms[0] / "_own_kernels.py" / "kept")
+    monkeypatch.setattr(kept_kernels, "KEPT", rooms[0] / "_kernels.py" / "kept")
     kept_kernels.keep(rooms[0].parent)
     monkeypatch.setenv("NUMBA_CPU_NAME", "another")
     assert not kept_kernels.restore(rooms[0].parent)

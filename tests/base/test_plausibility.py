@@ -7,13 +7,13 @@ import math
 import pytest
 
 from rcsa_ident.base import plausibility
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import DIAMETER, IMMERSION, STICKOUT, TANGENTIAL, PlausibilityCode, Range, proportion
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import materials
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import DIAMETER, IMMERSION, STICKOUT, TANGENTIAL, PlausibilityCode, Range, proportion
 
 RANGES = {name: kind for name, kind in vars(plausibility).items() if isinstance(kind, Range)} | plausibility.CONTACT
 

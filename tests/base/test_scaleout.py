@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rcsa_ident.cli import app
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.scaleout import ClusterLost, cluster_map
+from rcsa_ident.cli import app
 from tests.fixtures import scaleout_tasks as tasks
 from tests.fixtures.campaign import part_of_the_sample_runs
 from tests.fixtures.waiting import until

@@ -11,11 +11,11 @@ from benchmarks.machines import CONDITIONS, SENSOR_TESTS
 from benchmarks.page import read_rows
 from benchmarks.study import INSIDE, Run, planned
 from benchmarks.study_table import counts, coupled_table, line, sensors_table, table
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.search import SearchSettings

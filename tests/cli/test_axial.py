@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.results.axial_flanges import axial_of, axial_to_json
 from rcsa_ident.io.curves.tips import read_frf_csv, read_lobes_csv, write_frf_csv
+from rcsa_ident.io.results.axial_flanges import axial_of, axial_to_json
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.io.settings.setups import read_tooling

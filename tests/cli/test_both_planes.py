@@ -9,11 +9,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cli import compare, contact, decouple, export, identify, lobes, plan
 from rcsa_ident.cli.tables import show_identification
 from rcsa_ident.io.curves.tips import read_frf_csv, read_tip, write_frf_csv
 from rcsa_ident.io.uff import read_uff
-from rcsa_ident.base.units import to_rpm
 from rcsa_ident.workflows.identify import mode_deviations
 from tests.fixtures import by_hand, coupled_by_hand
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.io.settings.dynamometer import read_workpiece
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
+from rcsa_ident.io.settings.dynamometer import read_workpiece
 from rcsa_ident.io.settings.setups import read_campaign
 from tests.cli.measurements import run
 from tests.fixtures import by_hand

@@ -9,9 +9,9 @@ import sys
 import pytest
 import typer
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli import app
 from rcsa_ident.cli.common import _OPTIONS, answers
-from rcsa_ident.base.errors import InputError
 
 COMMANDS = [
     command.callback for each in (app, *(group.typer_instance for group in app.registered_groups)) for command in each.registered_commands

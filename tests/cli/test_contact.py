@@ -12,8 +12,8 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.curves.flanges import write_flange_csv
+from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import Contact
 from rcsa_ident.tool_holder.model import tool_holder_receptance

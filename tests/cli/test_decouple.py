@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.curves.flanges import read_flange_csv, read_flange_machine
-from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.results.parts import spindle_to_json, write_result
+from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.rotor import frequency_response, rotor

@@ -9,9 +9,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.forces import forces
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.curves.forces import read_forces_csv, sensors_of_result, write_forces_csv
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.results.parts import read_result, write_result

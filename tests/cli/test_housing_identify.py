@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 import rcsa_ident as ri
 from rcsa_ident.cli import app
+from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_tooling
-from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.paths import MACHINES, SAMPLES
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.diagnostics import failed
@@ -20,7 +21,6 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.io.settings.setups import read_campaign
-from rcsa_ident.base.remarks import Remark
 from tests.fixtures import by_hand
 from tests.fixtures.campaign import part_of_the_sample_runs
 from tests.fixtures.kept import kept

@@ -10,10 +10,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cli import advice, learn, lobes
 from rcsa_ident.io.results.learnt_tips import learnt_tip_of, learnt_tip_to_json, read_learnt_tip, write_learnt_tip
 from rcsa_ident.stability.labels.tested_cuts import Verdict
-from rcsa_ident.base.units import to_rpm
 
 APP = typer.Typer(pretty_exceptions_enable=False)
 APP.command("learn")(learn.learn)

@@ -15,12 +15,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli import advice, cases, export, lobes
 from rcsa_ident.cli.conditions import immersion_of
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.curves.frf_files import Source, read_tap_tests
+from rcsa_ident.io.curves.tips import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import read_result
 from tests.fixtures import by_hand

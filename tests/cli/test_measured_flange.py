@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.io.curves.tips import read_frf_csv, read_lobes_csv, write_frf_csv
 from rcsa_ident.io.curves.flanges import write_flange_machine
 from rcsa_ident.io.curves.forces import read_forces_csv
+from rcsa_ident.io.curves.tips import read_frf_csv, read_lobes_csv, write_frf_csv
 from rcsa_ident.io.recordings.readers import write_recording
 from tests.fixtures import by_hand
 from tests.fixtures.flange_machine import decoupled_file, flange_machine, paper_cut

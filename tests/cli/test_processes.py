@@ -13,8 +13,8 @@ import time
 
 import pytest
 
-from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.front.processes import THREADS, workers
+from rcsa_ident.identification.progress import Stage, Step
 from tests.fixtures.waiting import PATIENCE, until
 
 

@@ -65,8 +65,8 @@ def test_a_refused_demo_leaves_its_folder_as_it_was(tmp_path, there):
 
 
 def test_a_simulation_that_fails_leaves_nothing(tmp_path, monkeypatch):
-    from rcsa_ident.front import samples
     from rcsa_ident.base.errors import RcsaIdentError
+    from rcsa_ident.front import samples
 
     def broken(*_):
         yield from ()

@@ -9,11 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 import rcsa_ident as ri
-from rcsa_ident.cli import app
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import read_lobes_csv
+from rcsa_ident.cli import app
 from rcsa_ident.io.curves.frf_files import Source, read_tap_tests
 from rcsa_ident.io.curves.hammer import read_hammer
+from rcsa_ident.io.curves.tips import read_lobes_csv
 from tests.cli.test_tap import told
 
 FREQUENCY = np.arange(200.0, 2000.0, 5.0)

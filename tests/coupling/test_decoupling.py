@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.decoupling import decouple, with_slope
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.receptance import Receptance, dissipation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.tool_holder.model import tool_holder_structure
 from tests.coupling.test_rcsa import FLANGES, TOOL, W, spindle_structure, tool_in_both_planes
 

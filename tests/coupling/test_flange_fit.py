@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.flange_fit import Observation, least_squares_flange
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.coupling.smoothing import band_covariance, band_solve, bending, second_differences
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.receptance import dissipation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance

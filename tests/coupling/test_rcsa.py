@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.assembly import assemble
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
@@ -14,7 +15,6 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import damped_modes
 from rcsa_ident.dynamics.receptance import Receptance, dissipation
 from rcsa_ident.dynamics.structure import Structure, poles
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_structure

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.calibration import NAMES, ForceCalibration, calibrate_mean_force, mean_force_matrix, plausible
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history, force_lines, runout_force_lines, unit_lines
-from rcsa_ident.base.errors import InputError
 
 CUTTER = Cutter(4, 0.012, np.radians(30.0))
 SLOT = Engagement(0.0, np.pi)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.chip import feed_for_chip, thickest_share
 from rcsa_ident.cutting.conditions import Block, Engagement, Stepover
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.rows import rows_of
-from rcsa_ident.base.errors import InputError
 
 SLOT = Engagement(0.0, np.pi)
 

@@ -10,12 +10,12 @@ import pytest
 import scipy.integrate
 import scipy.optimize
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflected_process
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping
-from rcsa_ident.base.errors import InputError
 from tests.oracles.literature import DEFORMED_TOOL, TIP_DEFLECTION_MM
 from tests.stability.mills import RPM
 

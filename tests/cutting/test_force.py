@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES, force_and_slope, force_history, force_lines, runout_force_lines
-from rcsa_ident.base.errors import InputError
 
 COEFFICIENTS = CuttingCoefficients(9.02e8, 0.26, 0.1, 1.5e4, 2.0e4, 5e3)
 HALF = CuttingConditions(1250.0, 2e-3, 1e-4, Engagement.from_immersion(0.5, "down"), 0.7)

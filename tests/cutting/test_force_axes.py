@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -14,7 +15,6 @@ from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.force_axes import axes_choices
 from rcsa_ident.cutting.force_record import ForceRecord
 from rcsa_ident.cutting.signal_fit import Dynamometer
-from rcsa_ident.base.errors import InputError
 
 COEFFICIENTS = CuttingCoefficients(900e6, 0.27, 0.15, 14e3, 17e3, 3e3)
 FEEDS = (4e-5, 8e-5, 1.2e-4)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.materials import material, materials
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.materials import material, materials
 
 
 def test_every_entry_says_where_it_comes_from():

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.oblique import OrthogonalData, coefficients_at, coefficients_of_cut, inclinations, insert_angles
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.rows import rows_of
-from rcsa_ident.base.errors import InputError
 
 DEG = np.pi / 180.0
 #: Relations of the usual form with figures whose source could not be read: of no material that anyone should cut by.

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.outlines import TAKES, Dimensions, missing, outline_of, outline_through, rows_through
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.shape import CutterShape
-from rcsa_ident.base.errors import InputError
 from tests.cutting.test_profile import OUTLINES
 
 DEG = np.pi / 180.0

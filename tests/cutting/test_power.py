@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import tooth_force
 from rcsa_ident.cutting.power import SpindleDrive, radial_depth, spindle_load
-from rcsa_ident.base.errors import InputError
 
 EDGES = CuttingCoefficients(800e6, 0.3, 0.1, 8e3, 6e3)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
-from rcsa_ident.base.errors import InputError
 
 COEFFICIENTS = CuttingCoefficients(6e8, 0.3)
 HALF = Engagement.from_immersion(0.5, "down")

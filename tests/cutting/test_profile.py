@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.outlines import outline_through
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.segments import Arc, Line
-from rcsa_ident.base.errors import InputError
 
 DEG = np.pi / 180.0
 #: Outlines of every factory.

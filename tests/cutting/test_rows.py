@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import Block, Engagement, EngagementMap, Stepover, widest
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.forms import exponential_form, force_form, lines_of_rows, mean_over_turn, normal_form, product_form
@@ -12,7 +13,6 @@ from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.cutting.teeth import deepest, lags
-from rcsa_ident.base.errors import InputError
 from tests.stability.tilted_ball import tilted_ball
 
 DEG = np.pi / 180.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.shape import CutterCode, CutterShape
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.zero_order import ZeroOrder

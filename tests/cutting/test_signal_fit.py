@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting import signal_fit
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
@@ -15,7 +16,6 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.force_record import ForceRecord
 from rcsa_ident.cutting.signal_fit import Dynamometer, calibrate_signal, eccentric
-from rcsa_ident.base.errors import InputError
 
 TRUE = np.array([800e6, 240e6, 12e3, 9e3])
 COEFFICIENTS = CuttingCoefficients(TRUE[0], TRUE[1] / TRUE[0], 0.0, TRUE[2], TRUE[3])

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import Block, Engagement, EngagementMap, Stepover
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.rows import rows_of
 from rcsa_ident.cutting.stock import Immersion, check_cut, engagement_between, engagement_with
-from rcsa_ident.base.errors import InputError
 
 CYLINDER = Cutter(4, 0.012)
 #: The same cylinder, written as an outline.

@@ -9,31 +9,31 @@ import numpy as np
 import pytest
 
 import rcsa_ident as ri
-from rcsa_ident.io.settings.cases import read_cases
-from rcsa_ident.io.curves.tips import read_frf_csv, read_lobes_csv
-from rcsa_ident.io.settings.engagements import read_engagement_map
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.io.curves.exports import TAP_SUFFIXES
 from rcsa_ident.io.curves.flanges import read_flange_machine
 from rcsa_ident.io.curves.forces import read_forces_csv
 from rcsa_ident.io.curves.frf_files import read_frfs
-from rcsa_ident.io.results.learnt_tips import read_learnt_tip
-from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.curves.tips import read_frf_csv, read_lobes_csv
 from rcsa_ident.io.paths.meshes import MESHES, read_mesh
-from rcsa_ident.io.settings.modes import read_modes_file
-from rcsa_ident.io.recordings.open_recording import TEXT, open_recording
 from rcsa_ident.io.paths.path_forces import read_path_forces
 from rcsa_ident.io.paths.tool_paths import PROGRAMS, read_tool_path
-from rcsa_ident.io.settings.postures import read_postures
+from rcsa_ident.io.recordings.open_recording import TEXT, open_recording
 from rcsa_ident.io.recordings.readers import READERS, SOUND, read_cut, read_signals
-from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.io.recordings.robot_records import read_joint_record
+from rcsa_ident.io.results.learnt_tips import read_learnt_tip
+from rcsa_ident.io.results.parts import read_result
+from rcsa_ident.io.settings.cases import read_cases
+from rcsa_ident.io.settings.engagements import read_engagement_map
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.modes import read_modes_file
+from rcsa_ident.io.settings.postures import read_postures
 from rcsa_ident.io.settings.robot_static import read_static_tests
 from rcsa_ident.io.settings.spindle_drives import read_spindle_drive
 from rcsa_ident.io.settings.tested_cuts import read_tested_cuts
-from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.io.settings.tool_libraries import read_tool_library
 from rcsa_ident.io.settings.urdf import read_urdf
-from rcsa_ident.base.units import to_hz, to_rpm
+from rcsa_ident.io.text_columns import read_table
 from tests.fixtures.paths import ROOT
 
 FORMATS = ROOT / "docs" / "formats"

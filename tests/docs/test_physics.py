@@ -36,8 +36,8 @@ from rcsa_ident.observer.transfer_function import SampledModes
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
-from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.labels.next_test import most_telling
+from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.surface_error import surface_location_error
 from rcsa_ident.stability.zero_order import ZeroOrder

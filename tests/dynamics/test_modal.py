@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, PoleModel, damped_modes, normal_modes
 from rcsa_ident.dynamics.receptance import dissipation
-from rcsa_ident.base.errors import InputError
 from tests.oracles import literature, naive
 
 FLANGE = plane("flange")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.passivity import Correction, FrfCode, correction_of, judged, reciprocal
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.passivity import Correction, FrfCode, correction_of, judged, reciprocal
 
 FREQUENCY = np.arange(50.0, 3000.0, 5.0)
 OMEGA = 2.0 * np.pi * FREQUENCY

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import damped_modes, normal_modes
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.state_space import StateSpace
-from rcsa_ident.base.errors import InputError
 from tests.dynamics.test_state_space import OSCILLATOR, random_system, sampled
 
 #: A pair, and a real pole with half its residue.

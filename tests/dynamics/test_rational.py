@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.rational import FitStatus, fitted_poles, rational_fit
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.arrays import frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance, dissipation
-from rcsa_ident.base.errors import InputError
 
 ENDS = (*plane("tip"), *plane("flange"))
 W = np.array([10.0, 20.0, 30.0])

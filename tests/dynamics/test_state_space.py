@@ -9,8 +9,8 @@ import scipy.integrate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.state_space import StateSpace
 
 OSCILLATOR = StateSpace([[0.0, 1.0], [-400.0, -2.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
 

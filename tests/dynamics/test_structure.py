@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.dynamics.structure import Structure, natural_frequencies, poles, rigid_body_modes, unit_responses
-from rcsa_ident.base.errors import InputError
 
 
 def coordinates(count):

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import damped_modes
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.dynamics.turning_modes import TurningModes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.turning_spindle import FLANGE, REFINEMENT, flange_modes, gyroscopic_spindle
 

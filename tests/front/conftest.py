@@ -78,8 +78,8 @@ def triggered(tmp_path_factory) -> SimulatedCampaign:
     """A campaign of the sample machine whose sensors have a trigger, and one cut with a tool that it never cut with."""
     from dataclasses import replace
 
-    from rcsa_ident.io.settings.machines import read_machine
     from rcsa_ident.front.samples import sample_data, sample_toolings, simulate_campaign
+    from rcsa_ident.io.settings.machines import read_machine
 
     folder = tmp_path_factory.mktemp("shop")
     machine = read_machine(sample_data() / "hpm.toml")

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import rcsa_ident as ri
-from rcsa_ident.front import samples
 from rcsa_ident.cli import demo
 from rcsa_ident.cli.common import Stages
-from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.front import samples
 from rcsa_ident.front.processes import Workers
+from rcsa_ident.io.settings.machines import read_machine
 from tests.fixtures.paths import MACHINES, ROOT, SAMPLES, TOOLINGS
 
 

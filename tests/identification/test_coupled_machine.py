@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import directions
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.machine import MOST_KEPT_OF_BOTH
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, flange_modes, unpack
 from rcsa_ident.workflows.identify import mode_deviations

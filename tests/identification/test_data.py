@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.cut_data import RUNOUT_SPREAD, prepare
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.signals.frf import AxisLines

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.remarks import says
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
@@ -20,7 +21,6 @@ from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
-from rcsa_ident.base.remarks import says
 from tests.fixtures import by_hand
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 from tests.identification.models import vector_of

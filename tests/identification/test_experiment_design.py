@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.experiment_design import (
     CandidateCuts,
     MeanVariance,

@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import damped_modes
-from rcsa_ident.identification._kernels.lines import frf as kernels
+from rcsa_ident.identification._kernels import frf as kernels
 from rcsa_ident.identification.data import LEVER
 from tests.identification.substructures import candidate, lumped, substructure
 

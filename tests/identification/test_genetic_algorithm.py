@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.remarks import says
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
@@ -13,7 +14,6 @@ from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.genetic_algorithm import WIDE, LiteralCost, NoiseWeightedCost, PaperGeneticAlgorithm, SearchSpace, _Problem
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.status import Status
-from rcsa_ident.base.remarks import says
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from tests.oracles.literature import NOMINAL_MATERIALS, NOMINAL_TOOLINGS, PUBLISHED_JOINT, PUBLISHED_MODES

@@ -6,9 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import says
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import GAIN_SPREAD, with_tests
@@ -19,7 +20,6 @@ from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.sweep_correction import unswept
-from rcsa_ident.base.remarks import says
 from rcsa_ident.tool_holder.model import point_name, receptance_at_points, tool_holder_receptance
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA

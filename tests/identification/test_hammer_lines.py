@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import MOST_LINES, HammerLines, noise_of, thinned
 
 OMEGA = 2.0 * np.pi * np.arange(100.0, 4000.0, 1.0)

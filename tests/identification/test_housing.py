@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import says
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.data import couplable
 from rcsa_ident.identification.data import AxisData
 from rcsa_ident.identification.diagnostics import two_solutions
@@ -21,7 +22,6 @@ from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
-from rcsa_ident.base.remarks import says
 from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, shares_of
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, oblique, open_shop

@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification._kernels.lines import lines as kernels
+from rcsa_ident.identification._kernels import lines as kernels
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.genetic_algorithm import modal_fractions
 from tests.identification.substructures import candidate, lumped, substructure

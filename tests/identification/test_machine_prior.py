@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.assemble_result import WIDER
-from rcsa_ident.identification.tooling_update import FurtherFit
 from rcsa_ident.identification.machine_prior import Gaussian, KnownMachine
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.tooling_update import FurtherFit
 from rcsa_ident.tool_holder.alteration import ALTERATIONS
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 

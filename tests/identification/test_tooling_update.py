@@ -8,7 +8,6 @@ import pytest
 import scipy.linalg
 
 from rcsa_ident.identification.evidence import EvidenceSelection
-from rcsa_ident.identification.tooling_update import fit_further
 from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines, noise_of, thinned
 from rcsa_ident.identification.machine_prior import KnownMachine
@@ -17,6 +16,7 @@ from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.rough_data import with_rough_toolings
 from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.identification.tooling_update import fit_further
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings

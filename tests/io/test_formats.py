@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.recordings.readers import READERS, read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
@@ -230,6 +230,7 @@ def test_a_missing_package_is_named_with_its_extra(tmp_path, monkeypatch, module
 
 
 def test_no_package_of_an_extra_is_loaded_before_its_format_is_met():
-    code = "import sys, rcsa_ident.io.recordings.readers; print([m for m in ('nptdms', 'pyarrow', 'scipy.io', 'soundfile') if m in sys.modules])"
+    extras = "('nptdms', 'pyarrow', 'scipy.io', 'soundfile')"
+    code = f"import sys, rcsa_ident.io.recordings.readers; print([m for m in {extras} if m in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.recordings.readers import StoredSamples, in_si, read_cut, read_recording, read_signals
 from rcsa_ident.setup.machining_setup import Cut

@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.readers import read_cut, read_recording
 from rcsa_ident.io.uff import UffAxis, UffFunction, write_uff
 from rcsa_ident.signals.recording import Quantity, Sensor

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from rcsa_ident.io.settings.engagements import read_engagement_map
 from rcsa_ident.io.curves.flanges import flange_machine_of, read_flange_machine
 from rcsa_ident.io.curves.forces import read_forces_csv
 from rcsa_ident.io.curves.frf_files import read_frfs
 from rcsa_ident.io.paths.path_forces import read_path_forces
 from rcsa_ident.io.paths.tool_paths import read_tool_path, tool_path_of
-from rcsa_ident.io.settings.postures import read_postures
 from rcsa_ident.io.recordings.robot_records import read_joint_record
+from rcsa_ident.io.settings.engagements import read_engagement_map
+from rcsa_ident.io.settings.postures import read_postures
 from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.io.settings.spindle_drives import read_spindle_drive
 from rcsa_ident.io.settings.tested_cuts import read_candidates, read_tested_cuts

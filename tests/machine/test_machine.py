@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.assembly import assemble
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
@@ -14,7 +15,6 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.machine import LOWEST
 from rcsa_ident.machine.measured import FlangeCode, MeasuredFlange

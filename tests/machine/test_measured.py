@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.measured import MeasuredFlange, translations_only

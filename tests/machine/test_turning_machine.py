@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.dynamics.turning_modes import TurningModes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.machine import Machine

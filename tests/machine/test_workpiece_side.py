@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.uncertain import Doubted
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide, gives_way
 from rcsa_ident.signals.recording import Role

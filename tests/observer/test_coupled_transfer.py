@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import FitStatus, RationalFit
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.observer.coupled_transfer import CoupledTransfer, coupled_transfer
 from rcsa_ident.observer.force_model import AxisNoise, RandomWalk, TeethResonators, augmented
 from rcsa_ident.observer.kalman import kalman_filter, riccati

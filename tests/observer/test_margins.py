@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.observer.force_model import AxisNoise, RandomWalk, TeethResonators
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.margins import loop_margins, observer_margins

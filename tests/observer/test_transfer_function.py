@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.observer.transfer_function import SampledModes, acceleration_filter, high_pass, transfer_function, warped
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.flange_machine import BAND, paper_cut

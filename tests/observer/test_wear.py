@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.observer.wear import wear_indicators
 
 STEP = 1.0 / 25600.0

@@ -10,18 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_keys, cutter_of
-from rcsa_ident.io.settings.engagements import engagement_map_of, rows_of_map
 from rcsa_ident.io.curves.exports import write_receptances_csv, write_receptances_uff
 from rcsa_ident.io.curves.forces import read_forces_csv, write_forces_csv
 from rcsa_ident.io.curves.frf_files import Source, read_tap_tests
 from rcsa_ident.io.paths.meshes import read_mesh, write_mesh
 from rcsa_ident.io.paths.path_forces import write_joints
 from rcsa_ident.io.paths.tool_paths import read_tool_path, write_tool_path
+from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_keys, cutter_of
+from rcsa_ident.io.settings.engagements import engagement_map_of, rows_of_map
 from rcsa_ident.io.settings.postures import read_postures, write_postures
 from rcsa_ident.io.settings.robots import robot_keys, robot_of
 from rcsa_ident.io.settings.tested_cuts import read_tested_cuts, write_tests
@@ -30,7 +31,6 @@ from rcsa_ident.io.toml_text import keys_of_toml, toml_of
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.toolpath.path import RAPID, ToolPath
-from rcsa_ident.base.units import from_rpm, to_rpm
 from tests.fixtures.robots import robot
 from tests.toolpath.test_surface_kernels import box
 

@@ -10,10 +10,10 @@ import pytest
 from rcsa_ident.report.figures import svg
 from rcsa_ident.report.lobes import Judged, Panel, cases_figure, save_figure, stability_figure
 from rcsa_ident.stability.advice import UsableDepths
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict, tally
 from rcsa_ident.stability.operating_point import Bound, OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.surface_error import SurfaceError, Wall
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict, tally
 
 SPEED = np.linspace(400.0, 2000.0, 81)
 LIMIT = 1e-3 * (1.5 + np.sin(SPEED / 60.0))

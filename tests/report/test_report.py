@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
@@ -22,11 +23,10 @@ from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
-from rcsa_ident.setup.machining_setup import Campaign, Cut, Tooling, Workpiece
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
 from rcsa_ident.report.summaries import coefficient_rows, lobes_curves, lobes_summary, mode_rows, recording_rows, two_digits
+from rcsa_ident.setup.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import RecordCode, Verdict

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.setups import tooling_of
 from rcsa_ident.setup.machining_setup import CutSpec, Workpiece
 from rcsa_ident.workflows.identify import of_campaign

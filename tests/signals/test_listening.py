@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.listening_records import speeds_to_tell
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.signals.listening import Heard, listen
 from rcsa_ident.signals.recording import Quantity
-from rcsa_ident.base.units import from_rpm, to_rpm
 
 #: Amplitudes of the orders of a cut with four teeth and some run-out.
 CUT = {1: 0.2, 2: 0.05, 3: 0.08, 4: 1.0, 5: 0.1, 7: 0.04, 8: 0.5, 12: 0.3, 16: 0.1, 20: 0.05}

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import SLOPES, force_and_slope, force_lines
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.recordings.readers import read_cut
+from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.signals.measurement import among_fellows, fits_by_chance, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor

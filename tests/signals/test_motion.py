@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, measured_axes, motion_channels, shares_of
 from rcsa_ident.signals.recording import Quantity, Role, Sensor
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -18,7 +19,6 @@ from rcsa_ident.signals.measurement import measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.tap import tap
 from rcsa_ident.signals.verdict import RecordCode
-from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.workflows.listen import listen_to
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 from rcsa_ident.signals.sweep import UNUSED, WORKPIECE_UNUSED, judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import says
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.measurement import judge_air
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.verdict import RecordCode, examined, raw_faults, tooth_count_fault

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.signals.motion import workpiece_channels
 from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 from tests.fixtures.synthetic import COEFFICIENTS, RATE, RPM, conditions, pair, wave

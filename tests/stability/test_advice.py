@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.advice import highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.operating_point import Bound
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE

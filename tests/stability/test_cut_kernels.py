@@ -11,7 +11,7 @@ import scipy.integrate
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.cutting.serration import Serration
-from rcsa_ident.stability._kernels.depth_at_speed import cut as kernels
+from rcsa_ident.stability._kernels import cut as kernels
 from rcsa_ident.stability.monodromy import MonodromyOperator, lobatto
 from tests.oracles import naive
 from tests.stability.mills import RPM, SKEWED, mill, tip

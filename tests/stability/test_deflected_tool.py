@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.deflection import ToolDeflection, deflected_process
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -16,7 +17,6 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance, Variation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import both_directions, drawn_limits, stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency

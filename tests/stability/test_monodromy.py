@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.stability._kernels.depth_at_speed import cut as kernels
+from rcsa_ident.stability._kernels import cut as kernels
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.monodromy import MonodromyOperator, common_period, lobatto

@@ -7,8 +7,8 @@ import pytest
 
 import rcsa_ident as ri
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
-from rcsa_ident.stability._kernels.depth_at_speed import monodromy as kernels
-from rcsa_ident.stability._kernels.depth_at_speed import step as _step_kernels
+from rcsa_ident.stability._kernels import monodromy as kernels
+from rcsa_ident.stability._kernels import step as _step_kernels
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import longest_step
 from tests.oracles import naive

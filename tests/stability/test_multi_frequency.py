@@ -8,6 +8,7 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -16,7 +17,6 @@ from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVari
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.hill import fewer_delays
 from rcsa_ident.stability.lobes import stability_lobes

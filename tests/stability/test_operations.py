@@ -8,7 +8,8 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.stability import hill
-from rcsa_ident.stability._kernels.depth_at_speed import monodromy as _monodromy_kernels, time as _time_kernels
+from rcsa_ident.stability._kernels import monodromy as _monodromy_kernels
+from rcsa_ident.stability._kernels import time as _time_kernels
 from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES, METHODS
 from tests.stability.mills import RPM, mill, tip
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import Block, widest
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multiplier_limits import Growth, longest_step

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.stability._kernels.depth_at_speed import step as kernels
+from rcsa_ident.stability._kernels import step as kernels
 from rcsa_ident.stability.monodromy import MonodromyOperator, lobatto
 from rcsa_ident.stability.tip_modes import ModeArrays
 from tests.stability.mills import ONE, mill, tip

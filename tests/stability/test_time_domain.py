@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.force import force_history, force_lines, runout_force_lines
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Coordinate
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability import time_domain
 from rcsa_ident.stability.first_instability import first_loss
 from rcsa_ident.stability.full_discretisation import FullDiscretisation

@@ -10,7 +10,7 @@ import scipy.linalg
 
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.cutting.rows import places_of
-from rcsa_ident.stability._kernels.depth_at_speed import time as kernels
+from rcsa_ident.stability._kernels import time as kernels
 from rcsa_ident.stability.time_domain import _Cut
 from rcsa_ident.stability.tip_modes import ModeArrays
 from tests.stability import shaped_mills as mills

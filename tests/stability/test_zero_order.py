@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.oracles import literature, naive

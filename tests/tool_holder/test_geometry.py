@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from rcsa_ident.dynamics.structure import natural_frequencies
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.structure import natural_frequencies
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, ToolAssembly, clamped, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_structure
 

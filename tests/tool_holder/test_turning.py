@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import free_body, tool_holder_receptance
 from rcsa_ident.tool_holder.turning import TurningToolHolder, both_planes, turning_pair

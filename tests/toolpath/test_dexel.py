@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.dexel import DexelField, memory_of
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import Sweep, frame_of

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.engagement import chip_between_circles, chip_thickness, engagement_along
 from rcsa_ident.toolpath.path import ToolPath

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import AnyEngagement, Block, CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.poles import PoleResidue
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.march import Carrier, Cut, March, march, start_of
 from rcsa_ident.toolpath.walls import NOTHING, Walls
 

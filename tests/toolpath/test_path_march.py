@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.poles import PoleResidue
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.march import Carrier, Cut, mill_block
 from rcsa_ident.toolpath.path import RAPID, ToolPath

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.simulations import campaign_text
-from rcsa_ident.base.units import from_rpm
 from rcsa_ident.virtual.changes import REFERENCE_SPEED, Changes, ChipLaw, JointChanges, Turn, Warming, changed, course_of
 from rcsa_ident.virtual.milling import mill_cut, rigid_force_lines
 from rcsa_ident.virtual.rotor import rotor

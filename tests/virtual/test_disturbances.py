@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.settings.machines import read_machine
-from rcsa_ident.io.recordings.readers import read_recording
-from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.front.samples import simulate_campaign
+from rcsa_ident.io.recordings.readers import read_recording
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.signals.spectra import refine_speed
 from rcsa_ident.virtual.disturbances import Disturbances, disturbed, turning
 

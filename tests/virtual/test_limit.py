@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -15,7 +16,6 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.virtual.limit import directional_matrices, multiplier, true_limit

@@ -3,6 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Block, CuttingConditions, Engagement, EngagementMap, Stepover
 from rcsa_ident.cutting.cutter import Cutter
@@ -11,7 +12,6 @@ from rcsa_ident.cutting.force import force_history, force_lines, runout_force_li
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.dynamics.coordinates import Coordinate
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.virtual.milling import mill_cut, rigid_force_lines, synchronous_lines

@@ -3,11 +3,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly

@@ -6,14 +6,14 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import read_tip
-from rcsa_ident.io.settings.machines import read_machine
-from rcsa_ident.io.recordings.readers import read_recording
-from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.front.samples import simulate_campaign as simulate
+from rcsa_ident.io.curves.tips import read_tip
+from rcsa_ident.io.recordings.readers import read_recording
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.signals.recording import Quantity, Role
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.settings.machines import read_machine
-from rcsa_ident.io.recordings.readers import read_recording
-from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.front.samples import simulate_campaign
+from rcsa_ident.io.recordings.readers import read_recording
+from rcsa_ident.io.settings.machines import read_machine
+from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.signals.recording import Quantity, Role
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes

@@ -8,12 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.calibration import calibrate_mean_force
 from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.force_axes import axes_choices
 from rcsa_ident.cutting.signal_fit import Dynamometer, calibrate_signal
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.setup.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.compare import LocalMode, Place, compare, frac, local_modes, matched

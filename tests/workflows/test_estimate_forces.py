@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError, Unsteady
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError, Unsteady
 from rcsa_ident.io.curves.flanges import read_flange_machine, write_flange_machine
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.remarks import says
 from rcsa_ident.cutting.shape import CutterCode
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, pack, simple_axis
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.base.remarks import says
 from rcsa_ident.workflows.identify import mode_deviations, of_campaign
 from tests.fixtures import by_hand
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
@@ -13,7 +14,6 @@ from rcsa_ident.stability.labels.next_test import most_telling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.base.units import from_rpm
 from rcsa_ident.workflows.learn_from_cuts import Believed, learn_from_cuts, next_tests
 from tests.stability.labels.test_uncertain_tip import modes
 

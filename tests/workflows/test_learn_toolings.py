@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.toolings import write_tooling

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rcsa_ident.cli import app
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import says
+from rcsa_ident.cli import app
+from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.status import Status
+from rcsa_ident.io.recordings.readers import read_cut
 from rcsa_ident.io.results.identifications import identification_to_json
 from rcsa_ident.io.settings.machines import read_machine
-from rcsa_ident.io.recordings.readers import read_cut
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
-from rcsa_ident.base.remarks import says
-from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.workflows.identify import clock_error, data_of, identify, judge
 from rcsa_ident.workflows.simulate import true_receptances

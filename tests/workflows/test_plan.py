@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.experiment_design import Volume
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack

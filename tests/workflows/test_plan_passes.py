@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.sweep import WINDOW
 from rcsa_ident.workflows.plan import limits_at, plan_cuts
 from rcsa_ident.workflows.plan_passes import plan_passes

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.machine.robot.flexible import FlexibleRobot

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import RecordCode, Verdict

@@ -12,13 +12,13 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.uncertain import Doubted
+from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.identification.evidence import EvidenceSelection
-from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.recordings.readers import read_cut
+from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide
 from rcsa_ident.setup.machining_setup import CutSpec
-from rcsa_ident.front.samples import simulate_campaign
 from rcsa_ident.signals.recording import Role
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes

@@ -12,9 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import Block
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.base.units import to_rpm
 
 # %%
 # The outline is drawn from a few dimensions; the block under the mill reaches from y = -18.9 to 25.2 mm beside the path.

@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.coupling.flange_fit import Observation, least_squares_flange
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
@@ -18,7 +19,6 @@ from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.base.units import to_hz
 
 # %%
 # A machine of four modes stands for the real one.

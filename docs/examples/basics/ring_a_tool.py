@@ -15,12 +15,12 @@ import numpy as np
 from scipy.io import wavfile
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.identification.ring.ringing import UNKNOWNS
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.free_modes import bare, bending_modes
 from rcsa_ident.tool_holder.spread import Spread
 from rcsa_ident.tool_holder.taper import hung
-from rcsa_ident.base.units import to_hz
 
 rate, rng = 48_000, np.random.default_rng(1)
 

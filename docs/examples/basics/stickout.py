@@ -10,10 +10,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.machine.flange_machine import FlangeMachine
-from rcsa_ident.base.units import to_hz
 
 # %%
 # Each mode has a translation and a slope at the flange; in front of it stands the joint between spindle and holder.

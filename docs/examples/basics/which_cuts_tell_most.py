@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.identification.experiment_design import CandidateCuts, MeanVariance, deviations, exchanged, greedy
 from rcsa_ident.base.units import to_hz, to_rpm
+from rcsa_ident.identification.experiment_design import CandidateCuts, MeanVariance, deviations, exchanged, greedy
 
 # %%
 # h = 1 / (k (1 - r² + 2 i ζ r)) with r = ω / ω_n; the logarithms of k, ω_n and ζ are known to 5 %.

@@ -15,10 +15,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.machine.robot.compliance import static_compliance
 from rcsa_ident.machine.robot.flexible import modes_of
 from rcsa_ident.machine.robot.kinematics import tool_point_at
-from rcsa_ident.base.units import to_hz
 from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces, mirrored_postures, reached
 
 # %%

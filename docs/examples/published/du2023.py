@@ -13,8 +13,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflected_process
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflected_process
 
 # %%
 # One mode a direction, three teeth, 45° helix, four of ten millimetres in down-milling of aluminium.

@@ -14,11 +14,11 @@ import numpy as np
 import scipy.linalg
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.tool_holder.geometry import Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_structure
 from rcsa_ident.tool_holder.timoshenko import hutchinson
-from rcsa_ident.base.units import to_hz
 
 # %%
 # Carbide, Ø12 mm, 100 mm long; the five roots [Hz] were computed with 30 digits.

@@ -13,9 +13,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.machine.robot.flexible import modes_of
 from rcsa_ident.toolpath.march import Cut, mill_block
-from rcsa_ident.base.units import to_hz
 from rcsa_ident.workflows.paths.robot_milling import arm_carrier, feed_turn
 
 # %%

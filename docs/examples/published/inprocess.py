@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import plane
@@ -20,7 +21,6 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.tool_holder.geometry import Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.base.units import to_hz
 
 # %%
 # Table A.5: frequency [Hz], damping [%], Re and Im of translation [1e-4 sqrt(s/kg)] and slope [1e-4 rad sqrt(s/(kg m²))]; the

@@ -13,8 +13,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rcsa_ident as ri
-from rcsa_ident.stability.multiplier_limits import longest_step
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.stability.multiplier_limits import longest_step
 
 # %%
 # Natural frequency 922 Hz, damping ratio 1.1 %, modal mass 0.03993 kg; K_t 600 MPa, K_n 200 MPa.

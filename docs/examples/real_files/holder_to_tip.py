@@ -15,10 +15,10 @@ import numpy as np
 from kept import real_files
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.io.curves.frf_files import read_frfs
 from rcsa_ident.setup.machining_setup import Campaign, HammerTest
 from rcsa_ident.tool_holder.geometry import Material
-from rcsa_ident.base.units import to_hz
 
 address = "https://github.com/leekunhwee/Vibration-Signal-Processing"
 files = real_files(address, "holder_to_tip.png", *(f"hammer/frf_tip_from_point_{point}.txt" for point in (3, 5, 1)))

@@ -12,10 +12,10 @@ import numpy as np
 from kept import real_files
 
 import rcsa_ident as ri
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, learn_labels
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip
-from rcsa_ident.base.units import to_rpm
 
 files = real_files("https://github.com/gengxiangc/BSLD", "labelled_cuts.png", "labelled_cuts_118.csv", "labelled_cuts_training_40.csv")
 if files:

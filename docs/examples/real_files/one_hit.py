@@ -12,8 +12,8 @@ import numpy as np
 from kept import real_files
 
 import rcsa_ident as ri
-from rcsa_ident.io.curves.frf_files import read_frfs
 from rcsa_ident.base.units import to_hz
+from rcsa_ident.io.curves.frf_files import read_frfs
 
 address = "https://github.com/leekunhwee/Vibration-Signal-Processing"
 files = real_files(address, "one_hit.png", "hammer/raw_tap_tip_tip.txt", "hammer/frf_tip_from_point_1.txt")

@@ -15,17 +15,17 @@ from scipy.optimize import minimize
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.identification.experiment_design import d_optimal
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.arm.data import body_masses
 from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.static import REPEATABILITY, StaticTests, expected_information
+from rcsa_ident.identification.experiment_design import d_optimal
 from rcsa_ident.machine.robot.compliance import twist_per_payload
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques
 from rcsa_ident.machine.robot.kinematics import posed, tool_point_at
 from rcsa_ident.machine.robot.model import RobotModel
 from rcsa_ident.machine.robot.sensitivity import frequency_slopes, receptance_slopes
-from rcsa_ident.base.units import from_hz
 
 #: Scatter of a joint's encoder [rad], and of a natural frequency as a share; so many of these are heard.
 ENCODER, FREQUENCY, MODES = 1e-6, 5e-3, 8

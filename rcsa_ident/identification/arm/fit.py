@@ -14,21 +14,21 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import Map
+from rcsa_ident.base.units import from_hz
+from rcsa_ident.identification.arm.data import PosedData
+from rcsa_ident.identification.arm.misfit import PosedMisfit
+from rcsa_ident.identification.arm.modes import POSED, layout_of
+from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, pack, unpack
+from rcsa_ident.identification.arm.priors import ArmPriors
+from rcsa_ident.identification.arm.spindle_starts import drawn, spindle_of
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.joint_fit import refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.model_order import Report, evidence, grow_modes
 from rcsa_ident.identification.parameters import Unknowns
-from rcsa_ident.identification.arm.data import PosedData
-from rcsa_ident.identification.arm.spindle_starts import drawn, spindle_of
-from rcsa_ident.identification.arm.misfit import PosedMisfit
-from rcsa_ident.identification.arm.modes import POSED, layout_of
-from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, pack, unpack
-from rcsa_ident.identification.arm.priors import ArmPriors
 from rcsa_ident.identification.progress import Stage
 from rcsa_ident.identification.task import Phase, finite, perform
-from rcsa_ident.base.scaleout import Map
-from rcsa_ident.base.units import from_hz
 
 #: Up to which frequency a spindle is as good as rigid [Hz].
 ARM_BAND = 120.0

@@ -9,13 +9,13 @@ import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels.lines import whiten
+from rcsa_ident.identification.arm.data import PosedData
+from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, chain, unpack
+from rcsa_ident.identification.arm.priors import ArmPriors, posed_prior_rows
 from rcsa_ident.identification.coupled._kernels import ArmArrays, LineArrays, PosedPoints, SpindleArrays, posed_lines
 from rcsa_ident.identification.coupled.misfit import compliance_of
 from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines
 from rcsa_ident.identification.parameters import JOINT, Unknowns, scaled_joint
-from rcsa_ident.identification.arm.data import PosedData
-from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, chain, unpack
-from rcsa_ident.identification.arm.priors import ArmPriors, posed_prior_rows
 from rcsa_ident.identification.priors import PriorRows
 
 

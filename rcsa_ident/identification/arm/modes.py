@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from rcsa_ident.identification.arm.parameters import PosedLayout, SpindleParameters, pack, unpack
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Trial, new_modes
 from rcsa_ident.identification.parameters import Unknowns
-from rcsa_ident.identification.arm.parameters import PosedLayout, SpindleParameters, pack, unpack
 
 #: New modes that are tried at a time.
 PROMISING = 4

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.parameters import joint_of
+from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.identification.arm.data import SCALE
 from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, unpack
+from rcsa_ident.identification.parameters import joint_of
 from rcsa_ident.identification.posterior import steps_along
 from rcsa_ident.machine.flange_part import Doubt, JointedFlange
 from rcsa_ident.machine.robot.carried_spindle import CarriedSpindle

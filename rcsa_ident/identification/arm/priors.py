@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.identification.parameters import DAMPING_UNIT, lower_triangle
 from rcsa_ident.identification.arm.parameters import PosedLayout, unknown_of
+from rcsa_ident.identification.parameters import DAMPING_UNIT, lower_triangle
 from rcsa_ident.identification.priors import PriorRows, Priors
 from rcsa_ident.machine.robot.model import RobotModel
 

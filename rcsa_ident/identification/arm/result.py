@@ -8,15 +8,15 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.levenberg_marquardt import Solution
+from rcsa_ident.base.remarks import Remark, RemarkCode
+from rcsa_ident.base.shown import Shown
 from rcsa_ident.identification.arm.misfit import PosedMisfit
 from rcsa_ident.identification.arm.modes import layout_of
 from rcsa_ident.identification.arm.parameters import stiffening, unpack
 from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
+from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.robot.model import RobotModel
-from rcsa_ident.base.remarks import Remark, RemarkCode
-from rcsa_ident.base.shown import Shown
 
 #: Share of each line left unexplained above which the answer is suspect, and of the cuts that may contradict the others.
 WORST_MODEL_ERROR, MOST_BAD_CUTS = 0.02, 0.1

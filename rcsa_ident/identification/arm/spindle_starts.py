@@ -12,11 +12,11 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.identification.data import LEVER
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.arm.parameters import DIRECTIONS, SpindleParameters
+from rcsa_ident.identification.data import LEVER
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment
 from rcsa_ident.tool_holder.timoshenko import beam_matrices, section
-from rcsa_ident.base.units import from_hz
 
 #: Least and largest: length, diameter in front and behind, place of the front bearing [m], of the rear one as a share of the length;
 #: logarithms of the bearings' stiffness in X [N/m], of that in Y over it, of the damping ratio; of the joint's stiffness [N/m, N m/rad].

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.coupled.data import CoupledData
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
@@ -23,7 +24,6 @@ from rcsa_ident.identification.parameters import unpack as plane_unpack
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
 from rcsa_ident.identification.task import Phase, finite, perform
-from rcsa_ident.base.scaleout import Map
 
 #: Model errors from coarse to fine: what each plane has found for itself was bent to explain the other one's forces.
 SHARES = (0.05, 0.01, 0.003)

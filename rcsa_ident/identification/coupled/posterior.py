@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, damped_modes
 from rcsa_ident.dynamics.turning_modes import TurningModes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, lower_factor, pack, simple_axis

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, directions
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.curves.tips import AXES, write_frf_csv
 from rcsa_ident.io.files import replacing, write_text
 from rcsa_ident.io.uff import DISPLACEMENT, EXCITATION_FORCE, FRF, UffAxis, UffFunction, write_uff
 from rcsa_ident.signals.tap import TapFrf
-from rcsa_ident.base.units import to_hz
 
 #: Directions as universal files number them; a slope dy/dz is a rotation about -X.
 _DIRECTIONS = {Dof.X: 1, Dof.Y: 2, Dof.Z: 3, Dof.SLOPE_X: 5, Dof.SLOPE_Y: -4}

@@ -12,17 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.io.unread_columns import left_aside, reading_tables
 from rcsa_ident.machine.axial_flange import AxialFlange
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
-from rcsa_ident.base.units import from_hz, to_hz
 
 #: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.
 _ENTRIES = {"tF": (0, 0), "tM": (0, 1), "rM": (1, 1)}

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.settings.setups import sensor_of
 from rcsa_ident.io.text_columns import read_table

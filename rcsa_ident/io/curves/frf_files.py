@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction, judged, reciprocal
 from rcsa_ident.dynamics.receptance import MeasuredCurve, Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.curves.tips import AXES, FREQUENCY, read_frf_csv
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.uff import (
@@ -32,7 +33,6 @@ from rcsa_ident.io.uff import (
 )
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.machine.known_tip import measured_tip
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.told_units import UNITS_ALLOWED, FrfUnit, force_unit, frf_unit, hertz_in, is_untold, motion_unit, quotient
 from rcsa_ident.signals.verdict import RecordCode, assumed
 

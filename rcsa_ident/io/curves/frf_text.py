@@ -9,10 +9,10 @@ import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.io.curves.frf_header import QUANTITIES, Column, Header, read_header
 from rcsa_ident.io.text_columns import decoded
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.told_units import UNITS_ALLOWED, FrfUnit
 from rcsa_ident.signals.verdict import RecordCode, assumed
 

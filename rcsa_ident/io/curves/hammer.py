@@ -10,14 +10,14 @@ from typing import NamedTuple
 import tomlkit
 from tomlkit.items import InlineTable, Table
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.passivity import judged
 from rcsa_ident.dynamics.receptance import MeasuredCurve
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.files import read_bytes, write_text
 from rcsa_ident.io.curves.frf_files import read_frfs
+from rcsa_ident.io.files import read_bytes, write_text
 from rcsa_ident.io.settings.setups import SPREADS, read_tooling
-from rcsa_ident.io.toml_text import LARGEST_SETUP, one_line
 from rcsa_ident.io.settings.toolings import CONTACT_SPREADS
+from rcsa_ident.io.toml_text import LARGEST_SETUP, one_line
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.setup.machining_setup import HammerTest
 from rcsa_ident.tool_holder.geometry import Contact

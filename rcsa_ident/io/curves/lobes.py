@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_hz, from_rpm, to_cm3_per_min, to_hz, to_rpm
 from rcsa_ident.io.curves.tips import read_lobes_csv, write_lobes_csv, write_map_csv, write_speed_csv
 from rcsa_ident.stability.advice import Advice
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
-from rcsa_ident.base.units import from_hz, from_rpm, to_cm3_per_min, to_hz, to_rpm
 
 
 def write_lobes(

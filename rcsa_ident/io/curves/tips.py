@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.machine.known_tip import measured_tip
-from rcsa_ident.base.units import to_hz
 
 AXES = ("X", "Y", "Z")
 FREQUENCY = "frequency_hz"

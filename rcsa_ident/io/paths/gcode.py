@@ -14,15 +14,15 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
 from rcsa_ident.io.paths.gcode_blocks import CORNERS, FURTHER, KINDS, ROTARY, block_of, check_further, words_of
 from rcsa_ident.io.paths.gcode_cycles import MOST_REPEATS, Corner, Cycle
 from rcsa_ident.io.text_columns import decoded
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.verdict import RecordCode, assumed
 from rcsa_ident.toolpath.arcs import centre_of, chord_count, chords, turned
 from rcsa_ident.toolpath.path import RAPID, ToolPath
-from rcsa_ident.base.units import from_rpm, to_rpm
 
 LARGEST_PROGRAM = 100 * MEGABYTE
 #: Places that a program may lead to, chords of arcs counted; and lines that it may have.

@@ -12,8 +12,8 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.files import MEGABYTE, read_bytes, replacing
 from rcsa_ident.base.remarks import Remark, counted
+from rcsa_ident.io.files import MEGABYTE, read_bytes, replacing
 from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.toolpath.dexel import Surface, check_closed
 

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.io.files import write_text
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.base.units import to_hz, to_rpm
 
 PLACE = ("x_mm", "y_mm", "z_mm")
 

@@ -11,15 +11,15 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
+from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 from rcsa_ident.io.curves.tips import write_speed_csv
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.paths.gcode import Kept, read_gcode, write_gcode
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.io.unread_columns import left_aside, reading_tables
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 
 PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("i", "j", "k")
 FEED, SPEED = "feed_mm_per_min", "spindle_speed_rpm"

@@ -24,7 +24,7 @@ def _of(module: str) -> Reader:
     """A format's reader, imported with its library when the first file of that format is read."""
 
     def read(path: Path, names: Sequence[str], rate: float | None, **options: str) -> tuple[float, Sequence[Channel]]:
-        found: tuple[float, Sequence[Channel]] = import_module(f"rcsa_ident.io.{module}").read_channels(path, names, rate, **options)
+        found: tuple[float, Sequence[Channel]] = import_module(f"{__package__}.{module}").read_channels(path, names, rate, **options)
         return found
 
     return read
@@ -34,7 +34,7 @@ def _of(module: str) -> Reader:
 READERS: dict[str, Reader] = {
     ".h5": _of("hdf5"),
     ".hdf5": _of("hdf5"),
-    ".csv": _of("told_tables"),
+    ".csv": _of("self_describing_tables"),
     ".tdms": _of("tdms"),
     ".uff": _of("uff_records"),
     ".unv": _of("uff_records"),

@@ -11,15 +11,15 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.io import text_columns
 from rcsa_ident.io.channels import Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
+from rcsa_ident.io.recordings.text_rows import STAMP, beside, first_numbers, lines_of, numbers_of, rows_of
 from rcsa_ident.io.text_columns import LARGEST_TEXT, Meant, decoded
 from rcsa_ident.io.text_header import Head, columns_of, read_head, split, tells_rate, times_of
-from rcsa_ident.io.recordings.text_rows import STAMP, beside, first_numbers, lines_of, numbers_of, rows_of
 from rcsa_ident.io.time_base import Irregular, time_unit, uniform
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.recording import SI_UNITS, Quantity
 from rcsa_ident.signals.told_units import UNITS_OF_TIME, is_untold, quantity_in, seconds_in, volts_in
 from rcsa_ident.signals.verdict import RecordCode, assumed

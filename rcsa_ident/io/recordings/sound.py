@@ -12,9 +12,9 @@ from pathlib import Path
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.io.channels import LARGEST_STORED, RATE, Channel, Scratch, Signals, cannot_be_read, check_declared, the_only
 from rcsa_ident.io.files import existing_file
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.verdict import RecordCode
 
 COMPLETE = "a complete sound file: WAV, Wave64, AIFF, CAF, FLAC, Ogg or MP3"

@@ -12,11 +12,11 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark
 from rcsa_ident.io.channels import LARGEST_STORED, RATE, Channel, Signals, StoredChannel, check_declared, kept, the_only
 from rcsa_ident.io.files import Bytes, mapped
 from rcsa_ident.io.recordings.sound import cut, decoded
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.base.remarks import Remark
 from rcsa_ident.signals.verdict import RecordCode
 
 COMPLETE = "a complete WAV file"

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz
+from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machine.axial_flange import AxialFlange
-from rcsa_ident.base.units import from_hz, to_hz
 
 _KEYS = ("tooling", "band_hz", "poles", "constant_m_per_n")
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 from rcsa_ident.dynamics.modal import directions
 from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, parameter_names, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.io.results.parts import check_covariance, matrix_of
 from rcsa_ident.io.validated_table import Table, as_number, describe
-from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 
 _MOST_MODES, _MOST_DISCS = 200, 10
 _SHAPE = "four pairs of finite numbers: translation and slope in X, then in Y"

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import SHOWN
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.tool_holder.alteration import ALTERATIONS
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 from rcsa_ident.tool_holder.learnt import TERMS, LearnedValue
 from rcsa_ident.tool_holder.spread import LENGTHS
-from rcsa_ident.base.units import SHOWN
 
 _NUMBERS = ("drawn", "spread", "found", "deviation")
 _KINDS = ("tooling", "tool", "holder")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
@@ -21,15 +22,14 @@ from rcsa_ident.io.results.axial_flanges import axial_of
 from rcsa_ident.io.results.both_planes import both_planes_from_json, both_planes_to_json
 from rcsa_ident.io.results.drawings import axis_toolings_of, axis_toolings_to_json, known_toolings_of, known_toolings_to_json
 from rcsa_ident.io.results.parts import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
-from rcsa_ident.io.settings.setups import sensor_of
-from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.results.workpiece_sides import workpiece_side_of, workpiece_side_to_json
+from rcsa_ident.io.settings.setups import sensor_of
 from rcsa_ident.io.settings.workpieces import workpiece_keys, workpiece_of
+from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.setup.machining_setup import Campaign
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
-from rcsa_ident.base.units import from_hz, to_hz, to_rpm
 from rcsa_ident.version import __version__
 
 _MOST_MODES = 200

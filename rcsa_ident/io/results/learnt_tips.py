@@ -10,19 +10,19 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.results.parts import layout, plain, read_json
-from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
+from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.label_posterior import LabelModel, LabelPosterior
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
-from rcsa_ident.stability.methods import METHODS
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
-from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
+from rcsa_ident.stability.methods import METHODS
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.version import __version__
 
 #: What the key ``kind`` of such a file says; RESULT.json has no such key.

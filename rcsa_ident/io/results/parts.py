@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
-from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.settings.workpieces import workpiece_of
+from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity
-from rcsa_ident.base.units import from_hz, to_hz
 
 SCHEMA_VERSION = 1
 STATUSES = ("converged", "not validated", "suspect", "failed")

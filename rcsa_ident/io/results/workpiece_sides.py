@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.io.results.parts import AXES, check_covariance, matrix_of
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide
 from rcsa_ident.signals.recording import Role
-from rcsa_ident.base.units import from_hz, to_hz
 
 #: What the rows of a covariance are logarithms of, each for all modes.
 _LOGS = ("natural_frequency", "damping_ratio", "stiffness")

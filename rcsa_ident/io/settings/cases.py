@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rcsa_ident.base.plausibility import FEED_PER_TOOTH
 from rcsa_ident.cutting.conditions import AnyEngagement
 from rcsa_ident.io.settings.cuts import ENGAGEMENT_KEYS, engagement_of, feed_angle_of
 from rcsa_ident.io.settings.setups import read_tooling
@@ -13,7 +14,6 @@ from rcsa_ident.io.settings.tested_cuts import read_tested_cuts
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.setup.machining_setup import Tooling
-from rcsa_ident.base.plausibility import FEED_PER_TOOTH
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 
 _CASE = ("name", "tooling", "feed_direction", *ENGAGEMENT_KEYS, "feed_per_tooth_mm", "tests", "idle")

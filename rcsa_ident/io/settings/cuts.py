@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP, SPINDLE_SPEED
+from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cutting.conditions import AnyEngagement, Block, CuttingConditions, Engagement, EngagementMap, Stepover
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.stock import check_cut, engagement_between, engagement_with
@@ -16,8 +18,6 @@ from rcsa_ident.io.settings.engagements import COLUMNS as MAP_COLUMNS
 from rcsa_ident.io.settings.engagements import MOST_ROWS, engagement_map_of, read_engagement_map, rows_of_map
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.setup.machining_setup import Cut, Tooling
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP, SPINDLE_SPEED
-from rcsa_ident.base.units import from_rpm, to_rpm
 
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 _ANGLES, _SIDES, _RADIAL = ("entry_angle_deg", "exit_angle_deg"), ("y_from_mm", "y_to_mm"), ("radial_depth_mm", "strategy")

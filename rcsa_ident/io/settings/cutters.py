@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.plausibility import DIAMETER
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.outlines import TAKES, Dimensions, in_files, key_of, outline_of, outline_through, rows_through
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration, WaveShape
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.validated_table import Table, as_number, describe
-from rcsa_ident.base.plausibility import DIAMETER
 
 #: Dimensions by the keys of files, each with its field; angles are in degrees.
 DIMENSIONS = {key_of(each.name): each.name for each in fields(Dimensions)}

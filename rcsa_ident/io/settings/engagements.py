@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import read_table
 

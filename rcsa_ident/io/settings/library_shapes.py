@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.validated_table import Table
 
 Keys = dict[str, Any]

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP
+from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.io.settings.cuts import feed_angle_of
 from rcsa_ident.io.settings.setups import beam_segments, material_library
+from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.setup.machining_setup import Workpiece
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP
-from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
 from rcsa_ident.virtual.changes import Changes, ChipLaw, JointChanges, Warming
 from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle

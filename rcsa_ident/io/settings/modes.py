@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import TANGENTIAL, TIP_DAMPING, TIP_FREQUENCY
+from rcsa_ident.base.units import from_hz, from_rpm, to_hz
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.toml_text import read_toml, toml_of
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.base.plausibility import TANGENTIAL, TIP_DAMPING, TIP_FREQUENCY
-from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
-from rcsa_ident.base.units import from_hz, from_rpm, to_hz
+from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes
 
 #: Direction cosines of modes along an axis; those of `_OBLIQUE` tell their own.
 _ALONG = dict(zip("xyz", np.eye(3), strict=True))

@@ -10,10 +10,10 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import JOINT_STIFFNESS
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machine.robot.model import Body, Frame, Joint, RobotModel, Tilt
-from rcsa_ident.base.plausibility import JOINT_STIFFNESS
 
 _TOP = ("robot", "joints", "flange", "tool_point", "payload")
 _ROBOT = ("name", "source", "gravity_m_per_s2", "base_mass_kg")

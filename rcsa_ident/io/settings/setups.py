@@ -8,15 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.settings.cuts import CUT_KEYS, cut_of
-from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_of
-from rcsa_ident.io.settings.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
-from rcsa_ident.io.toml_text import read_toml
-from rcsa_ident.io.validated_table import Table, describe
-from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
-from rcsa_ident.setup.machining_setup import BareCutter, Campaign, Tooling
 from rcsa_ident.base.plausibility import (
     CONTACT,
     DENSITY,
@@ -26,6 +18,14 @@ from rcsa_ident.base.plausibility import (
     SEGMENT_LENGTH,
     STICKOUT,
 )
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.io.settings.cuts import CUT_KEYS, cut_of
+from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_of
+from rcsa_ident.io.settings.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
+from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
+from rcsa_ident.io.toml_text import read_toml
+from rcsa_ident.io.validated_table import Table, describe
+from rcsa_ident.setup.machining_setup import BareCutter, Campaign, Tooling
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
 from rcsa_ident.tool_holder.catalogue import assumed_contact

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.settings.cuts import cut_keys
+from rcsa_ident.base.units import from_hz, to_rpm
+from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.io.files import filling, write_text
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
+from rcsa_ident.io.settings.cuts import cut_keys
 from rcsa_ident.io.settings.machines import MachineFile, RobotSetup
-from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.settings.workpieces import workpiece_keys
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.setup.machining_setup import Tooling
-from rcsa_ident.base.units import from_hz, to_rpm
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
 from rcsa_ident.virtual.changes import course_of
 from rcsa_ident.virtual.machine import CutPlan

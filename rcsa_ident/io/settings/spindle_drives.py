@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm
+from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.base.units import from_rpm
 
 SPEED, POWER, TORQUE = "spindle_speed_rpm", "power_kw", "torque_nm"
 

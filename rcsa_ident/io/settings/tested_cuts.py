@@ -8,10 +8,10 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
 
 COLUMNS = ("spindle_speed_rpm", "axial_depth_mm", "verdict")
 #: May stand beside them; empty where nothing was measured.

@@ -18,16 +18,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.outlines import key_of, missing
 from rcsa_ident.cutting.shape import CutterShape
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.settings.hsm_libraries import hsm_entries, is_xml
 from rcsa_ident.io.settings.library_entries import plain_entry, preset_notes
 from rcsa_ident.io.settings.library_shapes import NotRead, check_type, iso_geometry, iso_shape_keys, shape_keys
 from rcsa_ident.io.settings.setups import tooling_of
-from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.io.settings.toolings import contact_keys, contact_spread_keys, tooling_text
+from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.io.validated_table import Table, listed
 from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.tool_holder.catalogue import typical_contact

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rcsa_ident.io.settings.cutters import cutter_keys
 from rcsa_ident.io.files import write_text
+from rcsa_ident.io.settings.cutters import cutter_keys
 from rcsa_ident.io.settings.setups import SPREADS
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.setup.machining_setup import Tooling

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.structure import Structure
 
 #: Directions in which its modes move: translation and slope in X, then in Y.
 _BENDING = 4

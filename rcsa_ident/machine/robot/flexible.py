@@ -8,8 +8,8 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.machine.mode_synthesis import WHOLE_FLANGE
 from rcsa_ident.machine.robot.inertia import mass_matrix
 from rcsa_ident.machine.robot.kinematics import PosedChain, posed

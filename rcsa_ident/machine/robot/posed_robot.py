@@ -10,6 +10,7 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
@@ -26,7 +27,6 @@ from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.rods import rod_poles
-from rcsa_ident.base.units import from_hz, to_hz
 
 #: A joint that nobody has told: its compliance is a hundred-thousandth of a slender tool's, and poles stay a small eigenvalue problem.
 STIFF = LumpedJoint(1e13, 1e10)

@@ -16,8 +16,8 @@ import scipy.signal
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.signals.sound.exponentials import Subspace, peaks, zoomed
 from rcsa_ident.base.units import to_hz
+from rcsa_ident.signals.sound.exponentials import Subspace, peaks, zoomed
 
 #: Lowest frequency that is listened to [Hz]: below it are mains, steps and doors.
 LOWEST = 250.0

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles, turned, walked
 from rcsa_ident.signals.sound.line_prominence import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.steady_part import hann
-from rcsa_ident.base.units import to_hz
 
 #: Orders that are looked at.
 ORDERS = 40

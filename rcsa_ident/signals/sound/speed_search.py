@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import to_hz
 from rcsa_ident.signals._kernels import comb_scores, sideband_scores
 from rcsa_ident.signals.sound.line_prominence import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.sound.order_lines import OrderLines, order_lines
 from rcsa_ident.signals.sound.rotation import ORDERS, RAMP, Rotation, follow, speed_path
 from rcsa_ident.signals.sound.speed_odds import log_odds, multiples
-from rcsa_ident.base.units import to_hz
 
 #: Length of the windows in which the speed is looked for [s]: fine enough for lines that lie close.
 _LONG = 4.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
+from rcsa_ident.base.errors import InputError, non_negative
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.base.errors import InputError, non_negative
 from rcsa_ident.stability.lobes import both_directions, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes, known_modes

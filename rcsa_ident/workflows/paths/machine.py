@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.units import from_hz
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.stability.tip_modes import DIRECTIONS
@@ -12,7 +13,6 @@ from rcsa_ident.toolpath.compensation import LARGEST, CompensatedPath, Place, li
 from rcsa_ident.toolpath.deviation import Deviation
 from rcsa_ident.toolpath.forces import ForceAlongPath
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.base.units import from_hz
 
 #: Of a machine that is known by its modes this stands for rest [Hz]; a measured one is asked where its measurement begins.
 _REST = 1.0

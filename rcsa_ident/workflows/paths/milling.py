@@ -21,8 +21,8 @@ from rcsa_ident.toolpath.removal import Sweep
 from rcsa_ident.toolpath.surface import Roughness, roughness
 from rcsa_ident.toolpath.walls import PathFrame, Walls
 from rcsa_ident.workflows.paths.removal import solid_of
-from rcsa_ident.workflows.paths.stability import stations_along
 from rcsa_ident.workflows.paths.robot_milling import arm_carrier
+from rcsa_ident.workflows.paths.stability import stations_along
 from rcsa_ident.workflows.tool_change import ToolChange
 
 #: Share of its swing by which the tip stands elsewhere after a turn where it chatters whatever the cut does; and where the cut stays as it

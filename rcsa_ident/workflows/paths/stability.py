@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.setup.machining_setup import Tooling
@@ -26,7 +27,6 @@ from rcsa_ident.stability.surface_error import forced_vibration, surface_locatio
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.engagement import PathEngagement
 from rcsa_ident.toolpath.path import ToolPath
-from rcsa_ident.base.units import to_rpm
 from rcsa_ident.workflows.paths.robot_milling import feed_turn
 from rcsa_ident.workflows.robot_postures import following
 from rcsa_ident.workflows.tool_change import ToolChange, modes_of

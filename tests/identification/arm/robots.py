@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 from typer.testing import CliRunner
 
+from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cli import app
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.io.settings.machines import RobotSetup, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.simulations import write_robot_campaign
 from rcsa_ident.machine.robot.model import Body
-from rcsa_ident.base.units import from_rpm
 from rcsa_ident.virtual.machine import CutPlan
 from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.workflows.simulate import simulate_robot

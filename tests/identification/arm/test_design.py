@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.experiment_design import d_optimal
-from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.design import (
     CUT_LINES,
     CUT_NOISE,
@@ -24,7 +22,9 @@ from rcsa_ident.identification.arm.design import (
     stable_cuts,
     static_tests,
 )
+from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.static import fit_static
+from rcsa_ident.identification.experiment_design import d_optimal
 from rcsa_ident.machine.robot.compliance import static_compliance
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.kinematics import tool_point_at

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.arm.spindle_starts import drawn, spindle_of
 from rcsa_ident.identification.arm.parameters import PosedLayout, chain, pack, share_of, stiffening, unknown_of, unpack
 from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
 from rcsa_ident.identification.arm.priors import arm_priors, posed_prior_rows
+from rcsa_ident.identification.arm.spindle_starts import drawn, spindle_of
 from tests.fixtures.robots import robot
 
 LAYOUT = PosedLayout(tuple(robot("tx200").chain().stiffness.tolist()), 7, 3, 2, 1)

@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.receptance import dissipation
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.identification.data import LEVER

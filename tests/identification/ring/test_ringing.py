@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_hz, to_hz
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.identification.ring.line_matching import gathered
 from rcsa_ident.identification.ring.ringing import MODEL_HIGHER, UNKNOWNS, learned, prior_std
 from rcsa_ident.setup.machining_setup import Tooling
@@ -19,7 +20,6 @@ from rcsa_ident.tool_holder.geometry import BeamSegment
 from rcsa_ident.tool_holder.spread import Spread
 from rcsa_ident.tool_holder.taper import hung
 from rcsa_ident.tool_holder.timoshenko import hutchinson
-from rcsa_ident.base.units import from_hz, to_hz
 from tests.tool_holder.test_taper import slender
 
 HEARD = from_hz(21600.0)

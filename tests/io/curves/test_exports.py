@@ -8,11 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import read_frf_csv
 from rcsa_ident.io.curves.exports import (
     write_modes,
     write_receptances_csv,
@@ -21,6 +20,7 @@ from rcsa_ident.io.curves.exports import (
     write_receptances_uff,
 )
 from rcsa_ident.io.curves.frf_files import Source, read_tap_tests
+from rcsa_ident.io.curves.tips import read_frf_csv
 from rcsa_ident.io.uff import read_uff
 
 OMEGA = 2.0 * np.pi * np.arange(400.0, 1500.0, 2.5)

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.curves.flanges import read_flange_csv, read_flange_machine, write_flange_csv, write_flange_machine
 
 F = np.array([100.0, 120.0, 150.0, 160.0, 200.0])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.curves.frf_files import Source, parse_units, read_frfs, read_tap_tests
+from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.uff import ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, FRF, VELOCITY, UffAxis, UffFunction, write_uff
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

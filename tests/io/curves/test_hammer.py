@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.curves.hammer import labelled, read_hammer, write_calibrated_tooling
+from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import Contact
 from rcsa_ident.tool_holder.spread import Spread

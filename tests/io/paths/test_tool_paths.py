@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.io.paths.tool_paths import read_tool_path, tool_path_of, write_tool_path
 from rcsa_ident.toolpath.path import RAPID, ToolPath
-from rcsa_ident.base.units import to_rpm
 
 
 def test_a_table_of_places():

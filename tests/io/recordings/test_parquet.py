@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.recordings.readers import parquet as reader
+from rcsa_ident.io.recordings import parquet as reader
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.recordings.readers import READERS, read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor

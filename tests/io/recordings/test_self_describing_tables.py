@@ -8,8 +8,8 @@ import pyarrow
 import pytest
 from pyarrow import parquet
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor

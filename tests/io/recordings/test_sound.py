@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from api.reading.samples import read_normalised, write_normalised
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import says
 from rcsa_ident.io.channels import notes_of
 from rcsa_ident.io.recordings.readers import read_recording, read_signals
-from rcsa_ident.base.remarks import says
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.signals.verdict import RecordCode, examined
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.recordings.readers import tdms as reader
+from rcsa_ident.io.recordings import tdms as reader
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.hostile_tdms import BIG_ENDIAN, HOSTILE, INTERLEAVED, METADATA, NEW_LIST, RAW, channel, segment

@@ -12,8 +12,8 @@ import scipy.io.wavfile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.recording_formats import wav

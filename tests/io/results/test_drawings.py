@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import PlausibilityCode
 from rcsa_ident.io.results.drawings import known_toolings_of, known_toolings_to_json
 from rcsa_ident.io.settings.setups import read_tooling, tooling_of
-from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.settings.toolings import write_tooling
+from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.base.plausibility import PlausibilityCode
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from tests.fixtures.paths import MACHINES

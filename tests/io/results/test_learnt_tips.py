@@ -10,8 +10,8 @@ from rcsa_ident.io.results.learnt_tips import read_learnt_tip, write_learnt_tip
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.stability.labels.label_posterior import LabelModel, LabelPosterior
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
+from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 

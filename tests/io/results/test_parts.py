@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.results.parts import layout, plain, read_result, spindle_from_json, spindle_to_json, write_result
 
 MODES = ModalModel(

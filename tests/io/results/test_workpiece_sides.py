@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
 from rcsa_ident.io.results.parts import read_result, write_result
 from rcsa_ident.io.results.updated_results import taught_result

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.conditions import Block, CuttingConditions, Engagement, EngagementMap, Stepover
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.conditions import Block, CuttingConditions, Engagement, EngagementMap, Stepover
 from rcsa_ident.io.settings.cuts import CUT_KEYS, cut_keys, cut_of
 from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_of
 from rcsa_ident.io.settings.engagements import read_engagement_map

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import HelixKind
 from rcsa_ident.cutting.serration import WaveShape
 from rcsa_ident.cutting.shape import CutterShape
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_keys, cutter_of
 from rcsa_ident.io.toml_text import keys_of_toml, toml_of
 from rcsa_ident.io.validated_table import Table

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.io.settings.dynamometer import read_workpiece, write_workpiece
 from rcsa_ident.setup.machining_setup import Workpiece
 

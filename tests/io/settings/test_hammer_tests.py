@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction
-from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.curves.hammer import read_hammer_test
+from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.settings.setups import read_campaign
 from tests.fixtures import by_hand
 

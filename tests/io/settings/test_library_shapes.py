@@ -12,8 +12,8 @@ import pytest
 
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.settings.setups import tooling_of
-from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.io.settings.tool_libraries import Assumptions, import_tools
+from rcsa_ident.io.toml_text import keys_of_toml
 from tests.fixtures.paths import ROOT
 
 FILE = ROOT / "tests" / "fixtures" / "library_of_shapes.json"

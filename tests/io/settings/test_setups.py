@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
-from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.settings.toolings import write_tooling
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.signals.recording import Quantity, Recording, Role
 from rcsa_ident.tool_holder.geometry import MATERIALS
 from tests.fixtures.cutters import keys_of

@@ -7,8 +7,8 @@ import pytest
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.robots import read_robot, robot_keys, turn_of
-from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.settings.urdf import read_urdf
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques, mass_matrix
 from rcsa_ident.machine.robot.kinematics import flange_at, posed

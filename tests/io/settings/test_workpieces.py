@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.io.settings.setups import read_campaign
-from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
+from rcsa_ident.io.validated_table import Table
 from rcsa_ident.setup.machining_setup import Workpiece
 
 LEAST = {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26}

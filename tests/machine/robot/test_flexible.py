@@ -6,14 +6,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.structure import poles
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import to_hz
+from rcsa_ident.dynamics.structure import poles
 from rcsa_ident.machine.robot.compliance import free_play, sag, spring_torques, static_compliance, twist_per_payload
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
 from rcsa_ident.machine.robot.inertia import gravity_torques, mass_matrix
 from rcsa_ident.machine.robot.kinematics import flange_at, posed, postures_of, tool_point_at
 from rcsa_ident.machine.robot.model import Frame
-from rcsa_ident.base.units import to_hz
 from tests.fixtures.robots import BENT, KR600, STRETCHED, TABLE_7, robot
 
 

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.units import from_rpm, to_hz
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.robot.carried_spindle import CarriedSpindle
 from rcsa_ident.machine.robot.compliance import static_compliance
@@ -23,7 +24,6 @@ from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes
 from rcsa_ident.tool_holder.model import tool_holder_structure
 from rcsa_ident.tool_holder.rods import rod_structure
-from rcsa_ident.base.units import from_rpm, to_hz
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.robots import TABLE_7, robot
 

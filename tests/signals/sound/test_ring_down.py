@@ -7,8 +7,8 @@ import pytest
 import scipy.signal
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.signals.sound.ring_down import ring_down
 from rcsa_ident.base.units import to_hz
+from rcsa_ident.signals.sound.ring_down import ring_down
 
 RATE = 48_000.0
 

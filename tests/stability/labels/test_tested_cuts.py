@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict, tally
 from rcsa_ident.base.units import from_rpm
+from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict, tally
 
 
 def test_four_cases_and_the_marginal_ones():

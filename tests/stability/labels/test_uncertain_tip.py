@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -12,10 +13,9 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.uncertain import UncertainReceptance, Variation
-from rcsa_ident.base.errors import InputError
+from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip, altered
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import TIP, TipModes
-from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip, altered
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 PROCESS = MillingProcess(Cutter(2, 0.012), CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.5, "down"))

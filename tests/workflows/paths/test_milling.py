@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
-from rcsa_ident.base.errors import InputError
+from rcsa_ident.front.samples import sample_tooling
 from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
-from rcsa_ident.front.samples import sample_tooling
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import ToolPath

@@ -15,8 +15,8 @@ from rcsa_ident.toolpath.blending import FirstOrderLag, QuadraticBlend
 from rcsa_ident.toolpath.compensation import Place
 from rcsa_ident.toolpath.forces import ForceAlongPath, on_all_moves
 from rcsa_ident.toolpath.path import RAPID, ToolPath
-from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces as at_rest_ahead
 from rcsa_ident.workflows.paths.robot import IdealForce, Mirror, RobotPath, compensate
+from rcsa_ident.workflows.paths.robot_compensation import ahead_of_forces as at_rest_ahead
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.robots import robot
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
