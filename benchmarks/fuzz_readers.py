@@ -370,7 +370,9 @@ TARGETS: Mapping[str, Target] = {
     "robot": Target(_of_keys(f"{_IO}.settings.robots", "robot_of"), seeds.of_repository("data/robots/tx200.toml"), "toml"),
     "cases": Target(_file(".toml", _cases), seeds.written(seeds.cases), "toml"),
     "workpiece": _small(".toml", "workpiece", "settings.dynamometer", "read_workpiece"),
-    "stickouts": Target(_by_path(".toml", f"{_IO}.settings.stickouts", "read_stickouts", (0.05, 0.07)), seeds.written(seeds.toolings), "toml"),
+    "stickouts": Target(
+        _by_path(".toml", f"{_IO}.settings.stickouts", "read_stickouts", (0.05, 0.07)), seeds.written(seeds.toolings), "toml"
+    ),
     "result": Target(_result, seeds.written(seeds.results), "json"),
     "learnt": Target(_learnt, seeds.written(seeds.learnts), "json"),
     "robot-result": Target(_robot_result, seeds.written(seeds.robot_results), "json"),

@@ -35,7 +35,8 @@ from rcsa_ident.toolpath.walls import NOTHING, Walls
 from tests.cutting import test_force
 from tests.observer import test_kalman
 from tests.oracles import literature, naive
-from tests.signals import test_ring_down, test_tap
+from tests.signals import test_tap
+from tests.signals.sound import test_ring_down
 from tests.stability import test_surface_error as walls
 from tests.stability import test_zero_order
 from tests.toolpath import test_march

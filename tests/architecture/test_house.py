@@ -49,7 +49,7 @@ def test_kernels_see_arrays_and_scalars_only():
 
 
 def file_of_tests(path: Path) -> Path:
-    """Of ``room/_kernels.py`` they stand in ``tests/room/test_kernels.py``, of ``room/_kernels/cut.py`` in ``tests/room/test_cut_kernels.py``."""
+    """Of ``room/_kernels.py`` it is ``tests/room/test_kernels.py``, of ``room/_kernels/cut.py`` ``tests/room/test_cut_kernels.py``."""
     within, room = path.parent.name == "_kernels", path.relative_to(PACKAGE).parent
     return ROOT / "tests" / (room.parent / f"test_{path.stem}_kernels.py" if within else room / "test_kernels.py")
 

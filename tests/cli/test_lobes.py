@@ -8,7 +8,6 @@ import json
 import re
 from base64 import b64decode
 from html import unescape
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,8 +23,8 @@ from rcsa_ident.io.curves.tips import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import read_result
 from tests.fixtures import by_hand
+from tests.fixtures.paths import SHARED
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 APP = typer.Typer(pretty_exceptions_enable=False)
 APP.command("lobes")(lobes.lobes)
 APP.command("advise")(advice.advise)

@@ -21,9 +21,9 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.recordings.readers import READERS, read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
+from tests.fixtures.paths import SAMPLES
 from tests.fixtures.recording_formats import FORMATS
 
-SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
 SENSORS = (
     Sensor("flange_x", Quantity.DISPLACEMENT, Dof.X, 1.0e4),
     Sensor("fixture_y", Quantity.ACCELERATION, Dof.Y, 1.1094e-3),

@@ -2,7 +2,6 @@
 back the same."""
 
 import tomllib
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -11,8 +10,8 @@ from hypothesis import strategies as st
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.toolings import tooling_text
 from rcsa_ident.io.toml_text import keys_of_toml, read_toml, toml_of
+from tests.fixtures.paths import ROOT
 
-ROOT = Path(__file__).parents[2]
 FILES = sorted(path for folder in ("data", "api/examples", "rcsa_ident") for path in (ROOT / folder).rglob("*.toml"))
 
 

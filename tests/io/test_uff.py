@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,8 +9,8 @@ from hypothesis import strategies as st
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.uff import ACCELERATION, EXCITATION_FORCE, FRF, UffAxis, UffFunction, read_uff, write_uff
+from tests.fixtures.paths import SHARED
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 EVEN = np.arange(100.0, 140.0, 0.78125)
 UNEVEN = np.geomspace(10.0, 5000.0, 37)
 

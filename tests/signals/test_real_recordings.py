@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,8 @@ from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.tap import tap
 from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.workflows.listen import listen_to
+from tests.fixtures.paths import SHARED
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="the real recordings are not there")
 
 #: Part of the file's name: speed [rev/min] of its windows, found by least squares one by one, teeth, and least explained share.

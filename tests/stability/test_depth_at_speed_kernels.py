@@ -9,7 +9,7 @@ import pytest
 import scipy.optimize
 from numpy.polynomial import Polynomial
 
-from rcsa_ident.stability._kernels.depth_at_speed import depth_at_speed as kernels
+from rcsa_ident.stability._kernels import depth_at_speed as kernels
 from tests.oracles import naive
 
 ALPHA = np.array([[-0.4, -1.1], [0.9, -0.5]])

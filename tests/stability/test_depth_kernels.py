@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.stability._kernels import depth as kernels
-from rcsa_ident.stability._kernels.depth_at_speed import depth_at_speed as plain
+from rcsa_ident.stability._kernels import depth_at_speed as plain
 
 OMEGA = 2.0 * np.pi * np.arange(500.0, 1400.0, 2.0)
 ALPHA = np.array([[-0.4, -1.1], [0.9, -0.5]])

@@ -57,7 +57,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
         return _sound(path, names, suffix)
     if suffix not in _LISTING:
         raise InputError("recording", f"suffix '{suffix}'", f"one of {', '.join(dict.fromkeys([*TEXT, *READERS]))}", str(path))
-    told: dict[str, str] = dict(import_module(f"{__package__}.{_LISTING[suffix]}").told_channels(path))
+    told: dict[str, str] = dict(import_module(f"rcsa_ident.io.recordings.{_LISTING[suffix]}").told_channels(path))
     units = {name: name_and_unit(name)[1] or unit for name, unit in told.items()}
     # beside channels of known units there may be others of another length or rate
     wanted = list(names) or [name for name, unit in units.items() if quantity_in(unit)[1] is not None] or list(units)

@@ -24,7 +24,8 @@ def _of(module: str) -> Reader:
     """A format's reader, imported with its library when the first file of that format is read."""
 
     def read(path: Path, names: Sequence[str], rate: float | None, **options: str) -> tuple[float, Sequence[Channel]]:
-        found: tuple[float, Sequence[Channel]] = import_module(f"{__package__}.{module}").read_channels(path, names, rate, **options)
+        reader = import_module(f"rcsa_ident.io.recordings.{module}")
+        found: tuple[float, Sequence[Channel]] = reader.read_channels(path, names, rate, **options)
         return found
 
     return read

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.curves.frf_files import Source, parse_units, read_frfs, read_tap_tests
 from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.uff import ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, FRF, VELOCITY, UffAxis, UffFunction, write_uff
+from tests.fixtures.paths import SHARED
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 FREQUENCY = np.arange(0.0, 2000.0, 5.0)
 OMEGA = 2.0 * np.pi * FREQUENCY
 

@@ -15,8 +15,8 @@ from rcsa_ident.io.curves.tips import write_frf_csv
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import Contact
 from rcsa_ident.tool_holder.spread import Spread
+from tests.fixtures.paths import TOOLINGS
 
-TOOLINGS = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings"
 F = np.array([100.0, 200.0, 300.0])
 H = np.array([1e-8, 2e-8 - 1e-8j, -1e-8j])
 FOUND = Contact(1.234567e10, 7.5e5, 1.5e5, 33.0)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import to_rpm
+from rcsa_ident.io.paths import gcode
 from rcsa_ident.io.paths.gcode import Kept, gcode_of, kept_words, read_gcode, write_gcode
-from rcsa_ident.io.paths.tool_paths import gcode
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from tests.fixtures.paths import ROOT
 

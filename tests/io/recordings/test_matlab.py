@@ -17,6 +17,7 @@ from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.hostile_matlab import HOSTILE, matrix, padded
 from tests.fixtures.hostile_matlab import file as file_of
+from tests.fixtures.paths import SHARED
 from tests.fixtures.recording_formats import mat73
 
 X = Sensor("x", Quantity.TRIGGER)
@@ -237,9 +238,6 @@ def test_a_struct_without_fields_has_an_end(tmp_path):
     path.write_bytes(raw.replace(shape, many, 1))
     with pytest.raises(InputError, match=r"channel x\.a: found no such channel"):
         signals(path, "x.a", rate=1.0)
-
-
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 
 def test_the_robot_of_the_shared_files():

@@ -15,10 +15,10 @@ from rcsa_ident.io.recordings import tdms as reader
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.hostile_tdms import BIG_ENDIAN, HOSTILE, INTERLEAVED, METADATA, NEW_LIST, RAW, channel, segment
+from tests.fixtures.paths import SHARED
 from tests.fixtures.recording_formats import tdms
 
 nptdms = pytest.importorskip("nptdms", reason="npTDMS is not installed")
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 A = Sensor("a", Quantity.TRIGGER)
 B = Sensor("b", Quantity.TRIGGER)
 RAMP = np.arange(1000, dtype=np.int16)

@@ -13,8 +13,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.io.uff import UffAxis, UffFunction, read_uff, write_uff
 from rcsa_ident.signals.recording import Quantity, Sensor
+from tests.fixtures.paths import SHARED
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 TIME = {"abscissa_axis": UffAxis(17, "s"), "ordinate": UffAxis(12, "m/s^2")}
 
 

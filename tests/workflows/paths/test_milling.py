@@ -1,7 +1,6 @@
 """Milling along paths: chatter where stability methods have their limits, on modes and on a robot with play; what is told of it."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +24,7 @@ from rcsa_ident.workflows.paths.milling import PathMilling, carriers_of, mill_pa
 from rcsa_ident.workflows.paths.removal import field_of
 from rcsa_ident.workflows.paths.stability import stations_along
 from rcsa_ident.workflows.tool_change import ToolChange
+from tests.fixtures.paths import ROOT
 
 TOOL = BareCutter("end mill", Cutter(3, 0.01, np.radians(30.0)))
 FEED = 5e-5
@@ -198,7 +198,7 @@ def test_an_arm_at_rest_is_on_its_path_whichever_way_it_goes(degrees: float) -> 
 
 
 def robot() -> PosedRobot:
-    return PosedRobot(FlexibleRobot(read_robot(Path(__file__).parents[2] / "data" / "robots" / "tx200.toml")), POSTURE)
+    return PosedRobot(FlexibleRobot(read_robot(ROOT / "data" / "robots" / "tx200.toml")), POSTURE)
 
 
 def test_a_robot_with_play_is_softer_where_it_is_loose_and_the_same_beyond() -> None:

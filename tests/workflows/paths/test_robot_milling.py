@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,13 +16,14 @@ from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles
 from rcsa_ident.virtual.robot import arm_matrices
 from rcsa_ident.workflows.paths.robot_milling import arm_carrier, feed_turn
+from tests.fixtures.paths import ROOT
 
 ALONG_X = np.array([1.0, 0.0, 0.0])
 
 
 @cache
 def arm(tilts: bool) -> FlexibleRobot:
-    return FlexibleRobot(read_robot(Path(__file__).parents[2] / "data" / "robots" / "tx200.toml"), tilts)
+    return FlexibleRobot(read_robot(ROOT / "data" / "robots" / "tx200.toml"), tilts)
 
 
 def pass_of(carrier: Carrier) -> March:
