@@ -23,6 +23,7 @@ from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVari
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion, engagement_with
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction
+from rcsa_ident.setup.fields import ASKED_CUT, COEFFICIENTS, told_in_si
 from rcsa_ident.signals.recording import Recording, Sensor, untold_distances
 from rcsa_ident.tool_holder.catalogue import assumption, stated
 from rcsa_ident.tool_holder.drawings import Drawing
@@ -262,6 +263,24 @@ class CutSpec(Shown):
         parts += [f"{name} {value:.4g}" for name, value in self.coefficients.items()]
         parts += [] if self.runout is None else [f"run-out {1e6 * (max(self.runout) - min(self.runout)):.2g} µm"]
         return ", ".join([*parts, *(str(each) for each in (self.damping, self.speed_variation) if each is not None)])
+
+
+def asked_cut(
+    engagement: AskedEngagement, feed_angle: float, keys: Mapping[str, Any], speed_variation: SpeedVariation | None = None
+) -> CutSpec:
+    """Return the cut of keys of `ASKED_CUT`; how its cutter is engaged, and where it goes, each door tells in its own way."""
+    told = told_in_si(ASKED_CUT, keys)
+    wears = "wear_land" in told and "indentation" in told
+    return CutSpec(
+        engagement,
+        feed_angle,
+        told.get("feed_per_tooth"),
+        told.get("material"),
+        told_in_si(COEFFICIENTS, keys),
+        told.get("runout"),
+        ProcessDamping(told["indentation"], told["wear_land"], told["friction"]) if wears else None,
+        speed_variation,
+    )
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -1,0 +1,174 @@
+"""Keys that people write, each declared once: readers, writers, schemas, bodies of the service, options and the page are made of these."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rcsa_ident.base.plausibility import (
+    AXIAL_RATIO,
+    EDGE,
+    FEED_PER_TOOTH,
+    INDENTATION,
+    RADIAL_RATIO,
+    RUNOUT,
+    SIDE,
+    TANGENTIAL,
+    WEAR_LAND,
+    Range,
+)
+
+#: The default of a key that must be there.
+NEEDED: Any = object()
+_DEGREE = math.radians(1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number that whoever reads it holds to its limits; a `Range` in its place is held to by the noun, which names the likely slip.
+
+    Parameters
+    ----------
+    unit : str
+    size, per : float
+        The unit is `size` / `per` in SI; of the two one is 1, so that the last digit is that of one operation.
+    least, most, above : float or None [unit]
+        `above` is not allowed itself, the others are.
+    whole : bool
+    """
+
+    unit: str = ""
+    size: float = 1.0
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    whole: bool = False
+    per: float = 1.0
+
+    @classmethod
+    def within(cls, kind: Range) -> Number:
+        """What is possible of a quantity, as plain limits."""
+        return cls(kind.unit, kind.size, *kind.possible)
+
+
+@dataclass(frozen=True, slots=True)
+class Many:
+    """A list of numbers, so many of them at most."""
+
+    each: Number
+    most: int
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """One of some names, or a number, which `what` calls in words."""
+
+    names: tuple[str, ...]
+    number: Number
+    what: str
+
+
+#: What may stand under a key; a tuple are choices, and `str` and `bool` themselves.
+Kind = Range | Number | Many | Named | tuple[str, ...] | type
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A key of a noun.
+
+    Parameters
+    ----------
+    name : str
+        Of the noun's field, which is in SI.
+    key : str
+        In files and bodies of the service; options have ``-`` in place of ``_``.
+    kind : Range, Number, Many, Named, tuple of str, or str or bool themselves
+    default : object
+        As the key has it, in its unit; None is not told.
+    described, help, label, hint : str
+        What the service, the option of a command (keys in braces are options, too) and the field of the page say of it.
+    """
+
+    name: str
+    key: str
+    kind: Kind
+    default: Any = NEEDED
+    described: str = ""
+    help: str = ""
+    label: str = ""
+    hint: str = ""
+
+    @property
+    def number(self) -> Range | Number:
+        """Of the unit and the limits of its numbers; without either where it has none."""
+        kind = self.kind
+        kind = kind.each if isinstance(kind, Many) else kind.number if isinstance(kind, Named) else kind
+        return kind if isinstance(kind, Range | Number) else Number()
+
+    def in_si(self, value: Any) -> Any:
+        """Return a value of the key as the noun has it; texts and None stay."""
+        if isinstance(value, list | tuple):
+            return tuple(self.in_si(each) for each in value)
+        if value is None or isinstance(value, str) or not isinstance(self.kind, Range | Number | Many | Named):
+            return value
+        number = self.number
+        return value * number.size if isinstance(number, Range) or number.per == 1.0 else value / number.per
+
+
+def told_in_si(fields: Iterable[Field], keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is told of a noun, by the names of its fields."""
+    return {each.name: each.in_si(keys[each.key]) for each in fields if keys.get(each.key) is not None}
+
+
+_ANGLE, _SIDE = Number("deg", _DEGREE, 0.0, 180.0), Number.within(SIDE)
+#: Of the feed in the machine's X-Y plane.
+DIRECTION = Named(("+X", "-X", "+Y", "-Y"), Number("deg", _DEGREE, -360.0, 360.0), "an angle from +X")
+#: Cutting coefficients of a cut that is asked about.
+COEFFICIENTS = (
+    Field("tangential", "ktc_mpa", TANGENTIAL, None, label="Tangential coefficient",
+          help="Tangential coefficient, MPa; default: the result's workpiece."),
+    Field("radial_ratio", "krc", RADIAL_RATIO, None, label="Radial over tangential", help="Radial ratio; default: the result's workpiece."),
+    Field("axial_ratio", "kac", AXIAL_RATIO, None, label="Axial over tangential",
+          help="Axial ratio; default: the result's workpiece, or 0."),
+    Field("tangential_edge", "kte_n_per_mm", EDGE, None, help="Tangential edge force, N/mm."),
+    Field("radial_edge", "kre_n_per_mm", EDGE, None, help="Radial edge force, N/mm."),
+)  # fmt: skip
+MATERIAL = Field(
+    "material", "material", str, None, described="Of the library of materials.", help="Coefficients of a material of the library."
+)
+#: A cut that somebody asks about: `CutSpec`.
+ASKED_CUT = (
+    Field("immersion", "immersion", Number("", 1.0, 0.001, 1.0), 0.5, label="Radial immersion",
+          described="Radial depth over diameter; 1 is a slot.", help="Radial depth over diameter, as 0.5 or 50%; 1 is a slot."),
+    Field("strategy", "strategy", ("up", "down"), "down", help="Up or down milling."),
+    Field("entry", "entry_deg", _ANGLE, None, described="With exit_deg in place of immersion.",
+          help="Entry angle from the normal direction, instead of {immersion}."),
+    Field("exit", "exit_deg", _ANGLE, None, help="Exit angle."),
+    Field("stock", "stock", ("stepover", "block"), None,
+          described="What stands around the cutter: a stepover of the immersion, as where the same cutter cut before, or a block.",
+          help="What stands around the cutter: stepover of {immersion}, as where the same cutter cut before (the default), or a block."),
+    Field("y_from", "y_from_mm", _SIDE, None, label="Block from",
+          described="Of a block: its sides beside the path, along the normal direction.",
+          help="One side of a block, mm beside the cutter's path along the normal."),
+    Field("y_to", "y_to_mm", _SIDE, None, label="Block to", help="The other side, mm."),
+    Field("engagement", "engagement", str, None, described="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up.",
+          help="Angles between which the edge cuts at each height: z_mm, entry_angle_deg, exit_angle_deg."),
+    Field("lead", "lead_deg", Number("deg", _DEGREE, -89.0, 89.0), None,
+          described="By which the tool leans towards the feed, with engagement.",
+          help="How far the tool leans towards the feed, degrees; with {engagement}."),
+    Field("feed_angle", "feed_direction", DIRECTION, "+X", described="Or degrees from +X.", help="+X -X +Y -Y, or degrees from +X."),
+    Field("feed_per_tooth", "feed_per_tooth_mm", FEED_PER_TOOTH, None, label="Feed per tooth",
+          help="Feed per tooth, mm: power, run-out, surface error."),
+    MATERIAL,
+    *COEFFICIENTS,
+    Field("runout", "runout_um", Many(Number.within(RUNOUT), 100), None, label="Run-out, tooth by tooth",
+          described="Radial offset of each edge.", help="Radial offset of each edge, um."),
+    Field("wear_land", "wear_land_um", Number.within(WEAR_LAND), None, label="Wear land",
+          described="Process damping, with indentation.", help="Width of the wear land behind the edge, um: adds process damping."),
+    Field("indentation", "indentation", Number.within(INDENTATION), None, label="Indentation",
+          described="[N/m^3], 1e14 for aluminium.", help="Indentation coefficient, N/m^3 (1e14 aluminium, 4e13 steel)."),
+    Field("friction", "friction", Number("", 1.0, 0.0, 2.0), 0.3, label="Friction of the worn land",
+          help="Coefficient of friction of the flank, with {wear_land_um}."),
+)  # fmt: skip

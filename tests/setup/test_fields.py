@@ -1,0 +1,62 @@
+"""Declared keys: their numbers in SI, and what every address of them takes and refuses."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.cli.conditions import cut_of
+from rcsa_ident.cli.options import CutOptions
+from rcsa_ident.cutting.stock import Immersion
+from rcsa_ident.setup.fields import ASKED_CUT, COEFFICIENTS, Field, Many, Number, told_in_si
+from rcsa_ident.setup.machining_setup import asked_cut
+
+WORN = {"wear_land_um": 80.0, "indentation": 1e14, "friction": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("kind", "written", "meant"),
+    [
+        (Number("mm", 1e-3), 12.0, 12.0 * 1e-3),
+        (Number("%", per=100.0), 35.0, 35.0 / 100.0),
+        (Number("deg", math.radians(1.0)), 90.0, math.pi / 2.0),
+        (Many(Number("µm", 1e-6), 4), [1.0, 2.0], (1.0 * 1e-6, 2.0 * 1e-6)),
+        (str, "carbide", "carbide"),
+        (Number("mm", 1e-3), None, None),
+    ],
+)
+def test_a_key_is_in_its_unit_and_the_noun_in_si(kind, written, meant):
+    assert Field("a", "a_mm", kind).in_si(written) == meant
+
+
+def test_what_is_not_told_is_left_to_the_noun():
+    assert told_in_si(COEFFICIENTS, {"ktc_mpa": 900.0, "krc": None, "odd": 1}) == {"tangential": 900.0 * 1e6}
+
+
+def test_every_key_of_a_cut_is_an_option_with_its_words():
+    assert [each.name for each in dataclasses.fields(CutOptions)] == [each.key for each in ASKED_CUT]
+    for each in ASKED_CUT:
+        (option,) = CutOptions.__annotations__[each.key].__metadata__
+        assert option.help
+        assert "{" not in option.help
+
+
+@pytest.mark.parametrize("field", [each for each in ASKED_CUT if hasattr(each.kind, "possible")], ids=lambda each: each.key)
+def test_a_cut_takes_both_ends_of_what_is_possible_and_says_what_that_is(field):
+    low, high = field.kind.possible
+    for end in (low, high):
+        assert asked_cut(Immersion(0.5, "down"), 0.0, {field.key: end}) == cut_of(CutOptions(**{field.key: end}))
+    for beyond in (low - abs(low) - 1.0, high * 1.01):
+        with pytest.raises(InputError) as error:
+            cut_of(CutOptions(**{field.key: beyond}))
+        assert f"a number at least {low:g} and at most {high:g}" in error.value.allowed
+
+
+@pytest.mark.parametrize("key", WORN)
+def test_a_worn_land_takes_both_ends_of_what_its_limits_are(key):
+    (number,) = (each.number for each in ASKED_CUT if each.key == key)
+    for end in (number.least, number.most):
+        assert cut_of(CutOptions(**WORN | {key: end})).damping is not None
