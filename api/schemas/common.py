@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 
 from rcsa_ident.base.plausibility import Range
 from rcsa_ident.setup.fields import NEEDED, Many, Named, Number
@@ -98,7 +99,7 @@ class Keys(Body):
             usual = vars(cls).get(each.key, ... if usual is NEEDED else usual)
             kind = _kind_of(each, limits)
             cls.__annotations__[each.key] = own.pop(each.key, kind | None if usual is None else kind)
-            setattr(cls, each.key, Field(usual, description=each.described or None))
+            setattr(cls, each.key, usual if isinstance(usual, FieldInfo) else Field(usual, description=each.described or None))
         cls.__annotations__ |= own
 
 

@@ -15,7 +15,7 @@ from api.work.paths import PathRequest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.stock import Immersion
-from rcsa_ident.setup.fields import COEFFICIENTS, MATERIAL
+from rcsa_ident.setup.fields import COEFFICIENTS, OF_MATERIAL
 from rcsa_ident.setup.machining_setup import CutSpec, asked_cut
 from rcsa_ident.stability.methods import MethodName
 
@@ -23,7 +23,7 @@ Millimetre = Annotated[float, Field(ge=1e-6, le=100.0)]
 _SHOWN: dict[str, Any] = {"tooling": EXAMPLE, "block_mm": [0.0, 0.0, -20.0, 60.0, 40.0, 0.0]}
 
 
-class PathCut(Keys, fields=(MATERIAL, *COEFFICIENTS)):
+class PathCut(Keys, fields=(OF_MATERIAL, *COEFFICIENTS)):
     """Coefficients of the material; those that are not given are the identification's workpiece's. What else a cut is the path says."""
 
     def spec(self) -> CutSpec:

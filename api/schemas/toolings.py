@@ -6,10 +6,11 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, StringConstraints
 
-from api.schemas.common import Answer, Body, Line
+from api.schemas.common import Answer, Body, Keys, Line
 from rcsa_ident.cutting.serration import WaveShape
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.settings.cutters import MOST_POINTS
+from rcsa_ident.setup.fields import CONTACT, MATERIAL, SEGMENT, SPREAD
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 MOST_SEGMENTS, MOST_TEETH = 200, 100
@@ -73,16 +74,11 @@ class CutterKeys(Body):
     tilt_deg: float | None = None
 
 
-class SegmentKeys(Body):
+class SegmentKeys(Keys, fields=SEGMENT):
     """A segment of tool or holder, from the free end towards the flange."""
 
-    length_mm: float
-    outer_diameter_mm: float
     inner_diameter_mm: float = 0.0
-    end_diameter_mm: float | None = None
     material: Text
-    area_mm2: float | None = None
-    second_moment_mm4: float | None = None
 
 
 class ToolKeys(Body):
@@ -102,37 +98,23 @@ class HolderKeys(Body):
     taper: Text | None = Field(None, description="What a ring hears behind the flange, as HSK-A63.")
 
 
-class ContactKeys(Body):
+class ContactKeys(Keys, fields=CONTACT):
     """[contact], per metre of insertion"""
 
-    translational_stiffness: float
-    rotational_stiffness: float
-    translational_damping: float
-    rotational_damping: float
+    translational_damping: float = Field()
+    rotational_damping: float = Field()
 
 
-class MaterialKeys(Body):
+class MaterialKeys(Keys, fields=MATERIAL):
     """[materials.NAME]"""
 
     youngs_modulus_gpa: float | None = None
     density: float | None = None
     poisson: float | None = None
-    loss_factor: float | None = None
 
 
-class SpreadKeys(Body):
+class SpreadKeys(Keys, fields=SPREAD):
     """[spread]: how well the drawing is known, standard deviations; 0 is exactly, and what is left out is as well as drawings are."""
-
-    stickout_mm: float | None = None
-    fluted_diameter_percent: float | None = None
-    youngs_modulus_percent: float | None = None
-    contact_stiffness_percent: float | None = None
-    contact_damping_percent: float | None = None
-    holder_diameter_percent: float | None = None
-    reclamping_percent: float | None = None
-    spindle_joint_percent: float | None = None
-    segment_length_mm: float | None = None
-    corner_radius_mm: float | None = None
 
 
 class ToolingKeys(Body):

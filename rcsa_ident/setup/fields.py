@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rcsa_ident.base.plausibility import (
     AXIAL_RATIO,
+    DENSITY,
     EDGE,
     FEED_PER_TOOTH,
     INDENTATION,
+    LOSS_FACTOR,
+    MODULUS,
     RADIAL_RATIO,
     RUNOUT,
+    SEGMENT_DIAMETER,
+    SEGMENT_LENGTH,
     SIDE,
     TANGENTIAL,
     WEAR_LAND,
     Range,
 )
+from rcsa_ident.base.plausibility import (
+    CONTACT as CONTACT_RANGES,
+)
+from rcsa_ident.tool_holder.spread import LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, Spread
 
 #: The default of a key that must be there.
 NEEDED: Any = object()
@@ -116,6 +125,16 @@ class Field:
         number = self.number
         return value * number.size if isinstance(number, Range) or number.per == 1.0 else value / number.per
 
+    def up_to(self, most: float) -> Field:
+        """Return the same, whose largest number hangs on other keys."""
+        assert isinstance(self.kind, Number)
+        return replace(self, kind=replace(self.kind, most=most))
+
+
+def keys_of(fields: Iterable[Field]) -> tuple[str, ...]:
+    """Return the keys of a noun, as its file has them."""
+    return tuple(each.key for each in fields)
+
 
 def told_in_si(fields: Iterable[Field], keys: Mapping[str, Any]) -> dict[str, Any]:
     """Return what is told of a noun, by the names of its fields."""
@@ -135,7 +154,7 @@ COEFFICIENTS = (
     Field("tangential_edge", "kte_n_per_mm", EDGE, None, help="Tangential edge force, N/mm."),
     Field("radial_edge", "kre_n_per_mm", EDGE, None, help="Radial edge force, N/mm."),
 )  # fmt: skip
-MATERIAL = Field(
+OF_MATERIAL = Field(
     "material", "material", str, None, described="Of the library of materials.", help="Coefficients of a material of the library."
 )
 #: A cut that somebody asks about: `CutSpec`.
@@ -161,7 +180,7 @@ ASKED_CUT = (
     Field("feed_angle", "feed_direction", DIRECTION, "+X", described="Or degrees from +X.", help="+X -X +Y -Y, or degrees from +X."),
     Field("feed_per_tooth", "feed_per_tooth_mm", FEED_PER_TOOTH, None, label="Feed per tooth",
           help="Feed per tooth, mm: power, run-out, surface error."),
-    MATERIAL,
+    OF_MATERIAL,
     *COEFFICIENTS,
     Field("runout", "runout_um", Many(Number.within(RUNOUT), 100), None, label="Run-out, tooth by tooth",
           described="Radial offset of each edge.", help="Radial offset of each edge, um."),
@@ -172,3 +191,51 @@ ASKED_CUT = (
     Field("friction", "friction", Number("", 1.0, 0.0, 2.0), 0.3, label="Friction of the worn land",
           help="Coefficient of friction of the flank, with {wear_land_um}."),
 )  # fmt: skip
+
+#: A segment of a tool or of a holder: `BeamSegment`.
+SEGMENT = (
+    Field("length", "length_mm", Number("mm", 1e-3, above=0.0, most=SEGMENT_LENGTH.possible[1]), label="Length"),
+    Field("diameter", "outer_diameter_mm", SEGMENT_DIAMETER, label="Diameter"),
+    Field("inner_diameter", "inner_diameter_mm", Number("mm", 1e-3, 0.0), 0.0, label="Bore", hint="none"),
+    Field("end_diameter", "end_diameter_mm", SEGMENT_DIAMETER, None, label="End diameter", hint="same"),
+    Field("material", "material", str),
+    Field("area", "area_mm2", Number("mm^2", 1e-6, above=0.0), None),
+    Field("second_moment", "second_moment_mm4", Number("mm^4", 1e-12, above=0.0), None),
+)
+#: What holds a tool in its holder, per metre of insertion: `Contact`.
+CONTACT = tuple(
+    Field(key, key, kind, 0.0 if "damping" in key else NEEDED, label=key.replace("_", " ").capitalize(), hint=kind.unit)
+    for key, kind in CONTACT_RANGES.items()
+)
+#: What a segment is made of: `Material`.
+MATERIAL = (
+    Field("youngs_modulus", "youngs_modulus_gpa", MODULUS),
+    Field("density", "density", DENSITY),
+    Field("poisson", "poisson", Number("", 1.0, 0.0, 0.499)),
+    Field("loss_factor", "loss_factor", LOSS_FACTOR, 0.0),
+)
+
+
+def _spread(name: str, label: str, hint: str = "") -> Field:
+    """How well a drawing is known, in millimetres or percent; the default is what an honest drawing is good for."""
+    unit, size, most = ("mm", 1e-3, LARGEST_LENGTH) if name in LENGTHS else ("%", 1e-2, LARGEST_SHARE)
+    key = f"{name}_{'mm' if name in LENGTHS else 'percent'}"
+    return Field(name, key, Number(unit, size, 0.0, round(most / size, 9)), getattr(Spread(), name) / size, label=f"± {label}", hint=hint)
+
+
+#: How well a drawing is known: `Spread`.
+SPREAD = (
+    _spread("stickout", "Stickout", "A presetter's; 0.3 mm with a ruler"),
+    _spread("fluted_diameter", "Fluted diameter", "Of an equivalent cylinder"),
+    _spread("youngs_modulus", "Young's modulus", "Of the tool"),
+    _spread("contact_stiffness", "Contact stiffness", "70 % where the contact is the catalogue's"),
+    _spread("contact_damping", "Contact damping"),
+    _spread("holder_diameter", "Holder diameters"),
+    _spread("reclamping", "Reclamping", "Contact, from clamping to clamping"),
+    _spread("spindle_joint", "Flange joint", "From clamping to clamping"),
+    _spread("segment_length", "Segment lengths"),
+    _spread("corner_radius", "Corner radius"),
+)
+
+#: Nouns whose keys are declared, by what they are called where all are told.
+NOUNS = {"cut": ASKED_CUT, "segment": SEGMENT, "contact": CONTACT, "material": MATERIAL, "spread": SPREAD}

@@ -8,11 +8,15 @@ import math
 import pytest
 
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import Range
 from rcsa_ident.cli.conditions import cut_of
 from rcsa_ident.cli.options import CutOptions
 from rcsa_ident.cutting.stock import Immersion
-from rcsa_ident.setup.fields import ASKED_CUT, COEFFICIENTS, Field, Many, Number, told_in_si
+from rcsa_ident.io.validated_table import Table
+from rcsa_ident.setup.fields import ASKED_CUT, COEFFICIENTS, CONTACT, MATERIAL, NOUNS, SEGMENT, SPREAD, Field, Many, Number, told_in_si
 from rcsa_ident.setup.machining_setup import asked_cut
+from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, Material
+from rcsa_ident.tool_holder.spread import Spread
 
 WORN = {"wear_land_um": 80.0, "indentation": 1e14, "friction": 0.3}
 
@@ -60,3 +64,39 @@ def test_a_worn_land_takes_both_ends_of_what_its_limits_are(key):
     (number,) = (each.number for each in ASKED_CUT if each.key == key)
     for end in (number.least, number.most):
         assert cut_of(CutOptions(**WORN | {key: end})).damping is not None
+
+
+LIMITED = [(noun, each) for noun, fields in NOUNS.items() for each in fields if isinstance(each.kind, Range | Number)]
+
+
+@pytest.mark.parametrize(("noun", "field"), LIMITED, ids=[f"{noun}.{each.key}" for noun, each in LIMITED])
+def test_a_reader_takes_both_ends_of_a_key_and_refuses_what_is_beyond_in_one_sentence(noun, field):
+    def read(value):
+        return Table({field.key: value}, "F.toml", noun).field(field)
+
+    kind = field.kind
+    least, most = kind.possible if isinstance(kind, Range) else (kind.least, kind.most)
+    for end in (least, most):
+        assert end is None or read(end) == end
+    for beyond, side in ((least, -1.0), (most, 1.0)):
+        if beyond is not None:
+            with pytest.raises(InputError) as error:
+                read(beyond + side * max(1e-6 * abs(beyond), 1e-12))
+            assert error.value.field == f"{noun}.{field.key}"
+            assert f"{'at least' if side < 0.0 else 'at most'} {beyond:g}" in error.value.allowed
+    if isinstance(kind, Number) and kind.above is not None:
+        with pytest.raises(InputError, match=f"above {kind.above:g}"):
+            read(kind.above)
+
+
+@pytest.mark.parametrize(
+    ("noun", "fields"),
+    [(Spread, SPREAD), (Contact, CONTACT), (Material, MATERIAL), (BeamSegment, SEGMENT)],
+    ids=lambda each: getattr(each, "__name__", ""),
+)
+def test_a_declaration_has_every_field_of_its_noun_and_the_noun_s_defaults(noun, fields):
+    own = {each.name: each.default for each in dataclasses.fields(noun) if each.compare}
+    assert {each.name for each in fields} == set(own)
+    for each in fields:
+        if own[each.name] is not dataclasses.MISSING:
+            assert each.in_si(each.default) == own[each.name]

@@ -20,8 +20,9 @@ from rcsa_ident.io.settings.cases import cases_of
 from rcsa_ident.io.settings.machines import machine_of
 from rcsa_ident.io.settings.modes import modes_of
 from rcsa_ident.io.settings.robots import robot_of
-from rcsa_ident.io.settings.setups import SPREADS, campaign_of, tooling_of
+from rcsa_ident.io.settings.setups import campaign_of, tooling_of
 from rcsa_ident.io.validated_table import Asked, Table, listening
+from rcsa_ident.setup.fields import SPREAD, keys_of
 from rcsa_ident.setup.machining_setup import Tooling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 
@@ -69,7 +70,7 @@ _TOOLINGS = (
         "holder": _HOLDER | {"model": "PG25", "taper": "HSK-A63"},
         "contact": _STIFF,
         "materials": _MATERIALS,
-        "spread": dict.fromkeys(SPREADS, 1.0),
+        "spread": dict.fromkeys(keys_of(SPREAD), 1.0),
     },
 )
 #: A tooling of other sizes: what hangs on those of the tooling is no limit of a campaign's keys.
