@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from api.schemas.common import CORRECTION, Answer, Body, CorrectionName, EngagementRows, Fault, Line
+from api.schemas.common import CORRECTION, Answer, Body, CorrectionName, EngagementRows, Fault, Keys
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
-from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.signals.recording import Quantity, Role, Sensor
+from rcsa_ident.io.settings.setups import sensor_of_keys
+from rcsa_ident.setup.fields import CAMPAIGN, SENSOR, WORKPIECE
+from rcsa_ident.signals.recording import Sensor
 
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
 
@@ -40,66 +40,27 @@ EXAMPLE: dict[str, Any] = {
     ],
 }
 
+#: What a query of forces does not ask of a sensor.
+_UNHEARD = ("gain_spread_percent", "cross_talk_percent", "delay_spread_us")
 
-class HeadKeys(Body):
+
+class HeadKeys(Keys, fields=CAMPAIGN):
     """[campaign]"""
 
-    name: Line | None = None
-    sampling_rate_hz: float | None = Field(None, description="For files without a sampling rate.")
-    clock_error_percent: float | None = Field(
-        None, ge=-2.0, le=2.0, description="By how much the recorder's clock runs fast: it takes that many more samples in a second."
-    )
-    axial_depth_spread_mm: float | None = Field(None, description="Standard deviation of the depth, common to a tooling's cuts; 0.02.")
-    speed_softening_percent: float | None = Field(
-        None, description="Standard deviation of the stiffness's change from the middle of the speeds to their end."
-    )
+    clock_error_percent: Annotated[float, Field(ge=-2.0, le=2.0)] | None = None
 
 
-class SensorKeys(Body):
+class SensorKeys(Keys, fields=SENSOR, limits=True):
     """A sensor as [sensors.CHANNEL] of campaign.toml; the key is the channel's name in the recordings."""
 
-    quantity: Literal["displacement", "acceleration", "trigger", "force"]
-    axis: Literal["X", "Y", "Z"] | None = None
-    sensitivity: float | None = Field(
-        None, ge=-1e12, le=1e12, description="Signal per quantity: V/m, V/(m/s^2), V/N; 1 where the file is in SI."
-    )
-    delay_s: float | None = Field(None, ge=-1.0, le=1.0)
-    bandwidth_hz: float | None = Field(None, gt=0.0)
-    role: Literal["spindle", "fixture", "table", "workpiece"] | None = Field(None, description="What an accelerometer is fixed to.")
-    mount_resonance_hz: float | None = Field(None, gt=0.0, description="Of the sensor on its mount, a magnet or wax.")
-    rotation_deg: float | None = Field(
-        None, ge=-180.0, le=180.0, description="Of what the sensor measures from its axis, about the spindle's, from +X towards +Y."
-    )
-    pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
-    tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
-    gain_spread_percent: float | None = Field(None, description="Standard deviation of the gain; 2. Counts where drawings are rough.")
-    cross_talk_percent: float | None = Field(None, description="Standard deviation of what it feels of the other axis; 1.5.")
-    delay_spread_us: float | None = Field(None, description="Standard deviation of its delay; 5.")
-    distance_behind_flange_mm: float | None = Field(
-        None,
-        ge=-100.0,
-        le=300.0,
-        description="How far a displacement sensor looks behind the face between holder and spindle; negative: at the holder.",
-    )
-    distance_spread_mm: float | None = Field(None, ge=0.0, le=100.0, description="Standard deviation of that distance; 1.")
+    sensitivity: Annotated[float, Field(ge=-1e12, le=1e12)] | None = None
+    gain_spread_percent: float | None = None
+    cross_talk_percent: float | None = None
+    delay_spread_us: float | None = None
 
     def sensor(self, name: str) -> Sensor:
-        """Return the sensor of a channel."""
-        return Sensor(
-            name,
-            Quantity(self.quantity),
-            None if self.axis is None else Dof(self.axis.lower()),
-            1.0 if self.sensitivity is None else self.sensitivity,
-            0.0 if self.delay_s is None else self.delay_s,
-            self.bandwidth_hz,
-            1 if self.pulses_per_revolution is None else self.pulses_per_revolution,
-            None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg),
-            None if self.role is None else Role(self.role),
-            self.mount_resonance_hz,
-            0.0 if self.rotation_deg is None else math.radians(self.rotation_deg),
-            distance=None if self.distance_behind_flange_mm is None else 1e-3 * self.distance_behind_flange_mm,
-            distance_spread=1e-3 * (1.0 if self.distance_spread_mm is None else self.distance_spread_mm),
-        )
+        """Return the sensor of a channel; how well it is known counts in identifications only."""
+        return sensor_of_keys(name, {key: value for key, value in dict(self).items() if key not in _UNHEARD})
 
 
 def given_sensors(keys: Mapping[str, SensorKeys] | None) -> tuple[Sensor, ...]:
@@ -107,20 +68,10 @@ def given_sensors(keys: Mapping[str, SensorKeys] | None) -> tuple[Sensor, ...]:
     return tuple(each.sensor(name) for name, each in (keys or {}).items())
 
 
-class WorkpieceKeys(Body):
+class WorkpieceKeys(Keys, fields=WORKPIECE):
     """[workpiece]"""
 
     name: Text
-    tangential_coefficient_mpa: float
-    radial_ratio: float
-    axial_ratio: float | None = None
-    tangential_edge_n_per_mm: float | None = None
-    radial_edge_n_per_mm: float | None = None
-    axial_edge_n_per_mm: float | None = None
-    tangential_coefficient_spread_percent: float | None = None
-    radial_ratio_spread_percent: float | None = None
-    edge_spread_percent: float | None = None
-    edge_force_spread_n_per_mm: float | None = Field(None, description="Standard deviation of edge forces that nobody tells; 10.")
 
 
 class CutConditions(BaseModel):

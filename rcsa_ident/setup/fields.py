@@ -27,6 +27,7 @@ from rcsa_ident.base.plausibility import (
 from rcsa_ident.base.plausibility import (
     CONTACT as CONTACT_RANGES,
 )
+from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Role
 from rcsa_ident.tool_holder.spread import LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, Spread
 
 #: The default of a key that must be there.
@@ -237,5 +238,68 @@ SPREAD = (
     _spread("corner_radius", "Corner radius"),
 )
 
+_PERCENT, _KNOWN = Number("%", 1e-2, 0.0, 50.0), Number("%", per=100.0, least=0.0, most=100.0)
+#: A material and its cutting coefficients: `CuttingCoefficients`, between the other two keys of `Workpiece`.
+WORKPIECE = (
+    Field("name", "name", str),
+    Field("tangential", "tangential_coefficient_mpa", TANGENTIAL, label="Tangential coefficient"),
+    Field("radial_ratio", "radial_ratio", RADIAL_RATIO, label="Radial over tangential"),
+    Field("axial_ratio", "axial_ratio", AXIAL_RATIO, 0.0),
+    Field("tangential_edge", "tangential_edge_n_per_mm", EDGE, 0.0),
+    Field("radial_edge", "radial_edge_n_per_mm", EDGE, 0.0),
+    Field("axial_edge", "axial_edge_n_per_mm", EDGE, 0.0),
+    Field("tangential_spread", "tangential_coefficient_spread_percent", _KNOWN, 5.0),
+    Field("ratio_spread", "radial_ratio_spread_percent", _KNOWN, 5.0),
+    Field("edge_spread", "edge_spread_percent", _KNOWN, 10.0),
+    Field("edge_force_spread", "edge_force_spread_n_per_mm", Number("N/mm", 1e3, 0.0, 200.0), 10.0,
+          described="Standard deviation of edge forces that nobody tells; 10."),
+)  # fmt: skip
+#: A channel and what stands behind it: `Sensor`; a trigger has some of these keys.
+SENSOR = (
+    Field("quantity", "quantity", tuple(str(each) for each in CAMPAIGN_QUANTITIES)),
+    Field("axis", "axis", ("X", "Y", "Z"), None),
+    Field("sensitivity", "sensitivity", Number("signal per SI unit"), label="Sensitivity",
+          described="Signal per quantity: V/m, V/(m/s^2), V/N; 1 where the file is in SI."),
+    Field("delay", "delay_s", Number("s", 1.0, -1.0, 1.0), 0.0),
+    Field("bandwidth", "bandwidth_hz", Number("Hz", above=0.0), None),
+    Field("role", "role", tuple(str(each) for each in Role), None, described="What an accelerometer is fixed to."),
+    Field("mount_resonance", "mount_resonance_hz", Number("Hz", above=0.0), None, described="Of the sensor on its mount, a magnet or wax."),
+    Field("rotation", "rotation_deg", Number("deg", _DEGREE, -180.0, 180.0), 0.0,
+          described="Of what the sensor measures from its axis, about the spindle's, from +X towards +Y."),
+    Field("pulses_per_revolution", "pulses_per_revolution", Number("", 1, 1, 100_000, whole=True), 1),
+    Field("tooth_angle", "tooth_angle_deg", Number("deg", _DEGREE, -360.0, 360.0), None),
+    Field("gain_spread", "gain_spread_percent", _PERCENT, 2.0,
+          described="Standard deviation of the gain; 2. Counts where drawings are rough."),
+    Field("cross_talk_spread", "cross_talk_percent", _PERCENT, 1.5,
+          described="Standard deviation of what it feels of the other axis; 1.5."),
+    Field("delay_spread", "delay_spread_us", Number("us", least=0.0, most=1000.0, per=1e6), 5.0,
+          described="Standard deviation of its delay; 5."),
+    Field("distance", "distance_behind_flange_mm", Number("mm", 1e-3, -100.0, 300.0), None, label="Behind the flange",
+          described="How far a displacement sensor looks behind the face between holder and spindle; negative: at the holder."),
+    Field("distance_spread", "distance_spread_mm", Number("mm", 1e-3, 0.0, 100.0), 1.0,
+          described="Standard deviation of that distance; 1."),
+)  # fmt: skip
+#: What counts for a whole campaign: `Campaign`.
+CAMPAIGN = (
+    Field("name", "name", str, None),
+    Field("sampling_rate", "sampling_rate_hz", Number("Hz", above=0.0, most=1e8), None, label="Sampling rate",
+          described="For files without a sampling rate.", hint="For files that carry none"),
+    Field("clock_error", "clock_error_percent", Number("%", 1e-2, -2.0, 2.0), 0.0,
+          described="By how much the recorder's clock runs fast: it takes that many more samples in a second."),
+    Field("depth_spread", "axial_depth_spread_mm", Number("mm", 1e-3, 0.0, 1.0), 0.02,
+          described="Standard deviation of the depth, common to a tooling's cuts; 0.02."),
+    Field("softening_spread", "speed_softening_percent", Number("%", 1e-2, above=0.0, most=50.0), 3.0,
+          described="Standard deviation of the stiffness's change from the middle of the speeds to their end."),
+)  # fmt: skip
+
 #: Nouns whose keys are declared, by what they are called where all are told.
-NOUNS = {"cut": ASKED_CUT, "segment": SEGMENT, "contact": CONTACT, "material": MATERIAL, "spread": SPREAD}
+NOUNS = {
+    "cut": ASKED_CUT,
+    "segment": SEGMENT,
+    "contact": CONTACT,
+    "material": MATERIAL,
+    "spread": SPREAD,
+    "workpiece": WORKPIECE,
+    "sensor": SENSOR,
+    "campaign": CAMPAIGN,
+}

@@ -11,10 +11,28 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.plausibility import Range
 from rcsa_ident.cli.conditions import cut_of
 from rcsa_ident.cli.options import CutOptions
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.stock import Immersion
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.fields import ASKED_CUT, COEFFICIENTS, CONTACT, MATERIAL, NOUNS, SEGMENT, SPREAD, Field, Many, Number, told_in_si
-from rcsa_ident.setup.machining_setup import asked_cut
+from rcsa_ident.setup.fields import (
+    ASKED_CUT,
+    CAMPAIGN,
+    COEFFICIENTS,
+    CONTACT,
+    MATERIAL,
+    NEEDED,
+    NOUNS,
+    SEGMENT,
+    SENSOR,
+    SPREAD,
+    WORKPIECE,
+    Field,
+    Many,
+    Number,
+    told_in_si,
+)
+from rcsa_ident.setup.machining_setup import Campaign, Workpiece, asked_cut
+from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread
 
@@ -89,14 +107,21 @@ def test_a_reader_takes_both_ends_of_a_key_and_refuses_what_is_beyond_in_one_sen
             read(kind.above)
 
 
-@pytest.mark.parametrize(
-    ("noun", "fields"),
-    [(Spread, SPREAD), (Contact, CONTACT), (Material, MATERIAL), (BeamSegment, SEGMENT)],
-    ids=lambda each: getattr(each, "__name__", ""),
-)
-def test_a_declaration_has_every_field_of_its_noun_and_the_noun_s_defaults(noun, fields):
-    own = {each.name: each.default for each in dataclasses.fields(noun) if each.compare}
-    assert {each.name for each in fields} == set(own)
+OF_NOUNS = [
+    (Spread, SPREAD), (Contact, CONTACT), (Material, MATERIAL), (BeamSegment, SEGMENT), (CuttingCoefficients, WORKPIECE[1:-1]),
+    (Workpiece, (WORKPIECE[0], WORKPIECE[-1])), (Sensor, SENSOR), (Campaign, CAMPAIGN),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("noun", "fields"), OF_NOUNS, ids=[noun.__name__ for noun, _ in OF_NOUNS])
+def test_a_key_that_is_left_out_is_what_its_noun_takes_then(noun, fields):
+    own = {each.name: each.default for each in dataclasses.fields(noun)}
     for each in fields:
-        if own[each.name] is not dataclasses.MISSING:
+        assert each.name in own
+        if each.default not in (NEEDED, None):
             assert each.in_si(each.default) == own[each.name]
+
+
+@pytest.mark.parametrize(("noun", "fields"), OF_NOUNS[:5], ids=[noun.__name__ for noun, _ in OF_NOUNS[:5]])
+def test_a_noun_of_numbers_has_a_key_for_each(noun, fields):
+    assert {each.name for each in fields} == {each.name for each in dataclasses.fields(noun) if each.compare}

@@ -17,7 +17,7 @@ from rcsa_ident.io.settings.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
-from rcsa_ident.setup.fields import CONTACT, MATERIAL, SEGMENT, SPREAD, keys_of, told_in_si
+from rcsa_ident.setup.fields import CAMPAIGN, CONTACT, MATERIAL, SEGMENT, SENSOR, SPREAD, keys_of, told_in_si
 from rcsa_ident.setup.machining_setup import BareCutter, Campaign, Tooling
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
@@ -29,24 +29,10 @@ from rcsa_ident.tool_holder.taper import tapers
 CAMPAIGN_FILE = "campaign.toml"
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials", "spread")
-_HEAD = ("name", "sampling_rate_hz", "clock_error_percent", "axial_depth_spread_mm", "speed_softening_percent")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts", "frfs")
-_SENSOR = (
-    "quantity",
-    "axis",
-    "sensitivity",
-    "delay_s",
-    "bandwidth_hz",
-    "role",
-    "mount_resonance_hz",
-    "rotation_deg",
-    "gain_spread_percent",
-    "cross_talk_percent",
-    "delay_spread_us",
-    "distance_behind_flange_mm",
-    "distance_spread_mm",
-)
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
+#: All others than those that only a trigger has.
+_FEELS = tuple(each for each in SENSOR if each.key not in _TRIGGER[-2:])
 
 
 def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
@@ -226,12 +212,8 @@ def campaign_of(
         Given the table of a cut and its key ``cut`` or ``air``, or that of a hammer test and ``file``, returns the file.
     """
     top = Table(data, where, known=_CAMPAIGN)
-    head = top.table("campaign", _HEAD, {})
-    name = head.text("name", name)
-    rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
-    clock = head.number("clock_error_percent", "%", 0.0, least=-2.0, most=2.0) * 1e-2
-    depth = head.number("axial_depth_spread_mm", "mm", 0.02, least=0.0, most=1.0) * 1e-3
-    softening = head.number("speed_softening_percent", "%", 3.0, above=0.0, most=50.0) * 1e-2
+    head = top.table("campaign", keys_of(CAMPAIGN), {})
+    own = told_in_si(CAMPAIGN, head.fields(CAMPAIGN, {"name": name}))
     # hammer tests alone need neither sensors nor a workpiece
     alone = "frfs" in top and "cuts" not in top
     channels = top.table("sensors", None, {})
@@ -257,7 +239,7 @@ def campaign_of(
         if id in seen:
             raise InputError(f"{place}.id", f'"{id}", the id of {seen[id]}', "an id of its own", where)
         seen[id] = place
-    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock, tests, depth, softening)
+    return Campaign(**{"sampling_rate": None} | own, sensors=sensors, workpiece=workpiece, toolings=toolings, cuts=cuts, tests=tests)
 
 
 def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
@@ -288,38 +270,25 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
     where : str
         The file, for the messages.
     """
-    kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
+    kind = Table(data, where, f"sensors.{name}", sorted(keys_of(SENSOR)))
     quantity = Quantity(kind.text("quantity", choices=CAMPAIGN_QUANTITIES))
     trigger = quantity is Quantity.TRIGGER
-    table = Table(data, where, f"sensors.{name}", _TRIGGER if trigger else _SENSOR)
-    default = [1.0] if trigger else []
-    sensitivity = table.number("sensitivity", "signal per SI unit", *default)
-    if sensitivity == 0.0:
+    fields = [each for each in SENSOR if each.key in _TRIGGER] if trigger else [each for each in _FEELS if each.key != "axis"]
+    table = Table(data, where, f"sensors.{name}", _TRIGGER if trigger else keys_of(_FEELS))
+    told = table.fields(fields, {"sensitivity": 1.0} if trigger else None)
+    if told["sensitivity"] == 0.0:
         table.refuse("sensitivity", "0", "a number other than 0 [V/m, V/(m/s^2), V/N], 1.0 where the file is in SI")
-    angle = table.number("tooth_angle_deg", "deg", None, least=-360.0, most=360.0)
-    role = table.text("role", None, choices=tuple(Role))
-    distance = table.number("distance_behind_flange_mm", "mm", None, least=-100.0, most=300.0)
     for key in ("distance_behind_flange_mm", "distance_spread_mm"):
         if key in table and quantity is not Quantity.DISPLACEMENT:
             table.refuse(key, describe(table.data[key]), f"none of a {quantity} sensor")
-    return Sensor(
-        name,
-        quantity,
-        None if trigger else Dof(table.text("axis", choices=("X", "Y", "Z") if quantity is Quantity.FORCE else ("X", "Y")).lower()),
-        sensitivity,
-        table.number("delay_s", "s", 0.0, least=-1.0, most=1.0),
-        table.number("bandwidth_hz", "Hz", None, above=0.0),
-        table.number("pulses_per_revolution", "", 1, least=1, most=100000, whole=True),
-        None if angle is None else float(np.radians(angle)),
-        None if role is None else Role(role),
-        table.number("mount_resonance_hz", "Hz", None, above=0.0),
-        float(np.radians(table.number("rotation_deg", "deg", 0.0, least=-180.0, most=180.0))),
-        table.number("gain_spread_percent", "%", 2.0, least=0.0, most=50.0) * 1e-2,
-        table.number("cross_talk_percent", "%", 1.5, least=0.0, most=50.0) * 1e-2,
-        table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) / 1e6,
-        None if distance is None else distance * 1e-3,
-        table.number("distance_spread_mm", "mm", 1.0, least=0.0, most=100.0) * 1e-3,
-    )
+    axis = {} if trigger else {"axis": table.text("axis", choices=("X", "Y", "Z") if quantity is Quantity.FORCE else ("X", "Y"))}
+    return sensor_of_keys(name, told | axis)
+
+
+def sensor_of_keys(name: str, keys: Mapping[str, Any]) -> Sensor:
+    """Return the sensor of a channel of keys that are held to their limits."""
+    nouns: dict[str, Callable[[Any], Any]] = {"quantity": Quantity, "axis": lambda axis: Dof(axis.lower()), "role": Role}
+    return Sensor(name, **{field: nouns.get(field, lambda value: value)(value) for field, value in told_in_si(SENSOR, keys).items()})
 
 
 def _inside(folder: Path, table: Table, key: str) -> Path:
