@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import ConfigDict, Field, StringConstraints
 
-from api.schemas.common import CORRECTION, Answer, Body, CorrectionName, EngagementRows, Fault, Keys
+from api.schemas.common import Answer, Body, Declared, EngagementRows, Fault, Keys
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
 from rcsa_ident.io.settings.setups import sensor_of_keys
-from rcsa_ident.setup.fields import CAMPAIGN, SENSOR, WORKPIECE
+from rcsa_ident.setup.fields import CAMPAIGN, CUT, HAMMER_TEST, RECORDINGS, SENSOR, WORKPIECE
 from rcsa_ident.signals.recording import Sensor
 
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
@@ -74,56 +74,30 @@ class WorkpieceKeys(Keys, fields=WORKPIECE):
     name: Text
 
 
-class CutConditions(BaseModel):
+class CutConditions(Declared, fields=CUT):
     """What a cut was: how its cutter was engaged is told by angles, a radial depth, a block's sides, or a map."""
 
     id: Text
     tooling: Text
-    spindle_speed_rpm: float
-    spindle_speed_to_rpm: float | None = Field(None, description="At which a pass ends whose speed changes evenly; null keeps the speed.")
-    axial_depth_mm: float
-    feed_per_tooth_mm: float
-    entry_angle_deg: float | None = Field(None, description="At the cutter's diameter; with a shape, down and up milling are stepovers.")
-    exit_angle_deg: float | None = None
-    radial_depth_mm: float | None = Field(None, description="With strategy, instead of the angles.")
-    strategy: Literal["up", "down"] | None = None
-    stock: Literal["stepover", "block"] | None = Field(None, description="What stood around the cutter.")
-    y_from_mm: float | None = Field(None, description="Of a block: its sides beside the cutter's path, along the normal direction.")
-    y_to_mm: float | None = None
-    engagement: EngagementRows | None = Field(None, description="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up.")
-    lead_deg: float | None = Field(None, description="By which the tool leans in the direction of the feed, with engagement.")
-    tilt_deg: float | None = None
-    feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
-    posture_deg: list[float] | None = Field(None, description="Of a robot's joints; an identification here takes cuts at one posture.")
-    started: str | None = Field(None, description="When the recording began, as 2026-11-27T08:15:00.")
-    temperature_c: float | None = Field(None, description="Near the spindle's bearings.")
-    validation: bool | None = Field(None, description="The cut is predicted, and nothing is learned from it.")
+    engagement: EngagementRows | None = None
+    feed_direction: str | float
+    started: str | None = None
 
 
-class CutKeys(Body, CutConditions):
+class CutKeys(Keys, CutConditions, fields=RECORDINGS):
     """[[cuts]]"""
 
-    cut: FileName = Field(description="Recording of the cut; only the last part of a path counts, and its suffix is the format.")
-    air: FileName | None = Field(None, description="Recording at the same speed without cutting; may serve several cuts.")
+    cut: FileName
+    air: FileName | None = None
 
 
-class HammerTestKeys(Body):
+class HammerTestKeys(Keys, fields=HAMMER_TEST):
     """[[frfs]]"""
 
     id: Text
     tooling: Text
-    axis: Literal["X", "Y"]
-    response: Literal["tip", "flange"] | float = Field(description="tip, flange (the machine's side of it), or mm from the tip.")
-    force: Literal["tip", "flange"] | float = Field(description="As response; one of the two is a point of tool or holder.")
-    file: FileName = Field(description="File of the FRF; only the last part of a path counts, and its content says what it is.")
-    record: int | None = Field(None, description="Which of several FRFs in the file.")
-    units: str | None = Field(None, description="Of a file that tells none: a motion over a force, such as um/N.")
-    standstill: bool | None = None
-    sensor_mass_g: float | None = None
-    from_hz: float | None = None
-    to_hz: float | None = None
-    error_percent: float | None = Field(None, description="By how much each line may be wrong beside its noise; 2 if left out.")
-    correction: CorrectionName | None = Field(None, description=CORRECTION)
+    file: FileName
+    units: str | None = None
 
 
 class NewCampaign(Body):

@@ -22,7 +22,6 @@ Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 Line = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 #: What is done to a measured FRF, as `rcsa_ident.dynamics.passivity.Correction` names it.
 CorrectionName = Literal["auto", "none", "reverse", "conjugate", "conjugate-reverse", "exchange", "exchange-reverse"]
-CORRECTION = "Of a reversed sensor or hammer, of time as e^(-iωt), of exchanged columns; auto turns what is certain and says so."
 #: Rows of a map of engagement, each a height and two angles.
 EngagementRows = Annotated[list[Annotated[list[float], Field(min_length=3, max_length=3)]], Field(min_length=1, max_length=1000)]
 #: Keys of a body or of a part of it, and items of one key.
@@ -76,8 +75,8 @@ def _number(field: Key, limits: bool) -> Any:
     return Annotated[int if number.whole else float, Field(ge=number.least, gt=number.above, le=number.most)]
 
 
-class Keys(Body):
-    """A body of declared keys; a class types or limits some of them otherwise, where bodies tell something else than files.
+class Declared(BaseModel):
+    """Declared keys; a class types or limits some of them otherwise, where bodies tell something else than files.
 
     Parameters
     ----------
@@ -101,6 +100,10 @@ class Keys(Body):
             cls.__annotations__[each.key] = own.pop(each.key, kind | None if usual is None else kind)
             setattr(cls, each.key, usual if isinstance(usual, FieldInfo) else Field(usual, description=each.described or None))
         cls.__annotations__ |= own
+
+
+class Keys(Body, Declared):
+    """A body of declared keys."""
 
 
 class Answer(BaseModel):

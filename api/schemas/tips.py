@@ -6,8 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
 
-from api.schemas.common import CORRECTION, Body, CorrectionName
+from api.schemas.common import Body, CorrectionName
 from api.schemas.toolings import CutterKeys, Text
+from rcsa_ident.setup.fields import CORRECTION
 
 #: Direct and cross FRFs along three axes.
 MOST_FRFS = 9

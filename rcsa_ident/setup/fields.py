@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rcsa_ident.base.plausibility import (
+    AXIAL_DEPTH,
     AXIAL_RATIO,
     DENSITY,
     EDGE,
@@ -20,6 +21,7 @@ from rcsa_ident.base.plausibility import (
     SEGMENT_DIAMETER,
     SEGMENT_LENGTH,
     SIDE,
+    SPINDLE_SPEED,
     TANGENTIAL,
     WEAR_LAND,
     Range,
@@ -27,6 +29,7 @@ from rcsa_ident.base.plausibility import (
 from rcsa_ident.base.plausibility import (
     CONTACT as CONTACT_RANGES,
 )
+from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Role
 from rcsa_ident.tool_holder.spread import LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, Spread
 
@@ -65,10 +68,10 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Many:
-    """A list of numbers, so many of them at most."""
+    """A list of numbers, so many of them at most if there is a limit."""
 
     each: Number
-    most: int
+    most: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +129,15 @@ class Field:
         number = self.number
         return value * number.size if isinstance(number, Range) or number.per == 1.0 else value / number.per
 
+    @property
+    def needed(self) -> Field:
+        """The same, where other keys ask for it."""
+        return replace(self, default=NEEDED)
+
     def up_to(self, most: float) -> Field:
         """Return the same, whose largest number hangs on other keys."""
+        if isinstance(self.kind, Named):
+            return replace(self, kind=replace(self.kind, number=replace(self.kind.number, most=most)))
         assert isinstance(self.kind, Number)
         return replace(self, kind=replace(self.kind, most=most))
 
@@ -142,7 +152,10 @@ def told_in_si(fields: Iterable[Field], keys: Mapping[str, Any]) -> dict[str, An
     return {each.name: each.in_si(keys[each.key]) for each in fields if keys.get(each.key) is not None}
 
 
-_ANGLE, _SIDE = Number("deg", _DEGREE, 0.0, 180.0), Number.within(SIDE)
+_ANGLE, _LEAN = Number("deg", _DEGREE, 0.0, 180.0), Number("deg", _DEGREE, -89.0, 89.0)
+_SIDE, _FAR = Number.within(SIDE), Number("mm", 1e-3, -1e4, 1e4)
+#: Of a hammer test, on the tooling; how far it may lie from the tip hangs on that.
+_POINT = Named(("tip", "flange"), Number("mm", 1e-3, 0.0), "the distance from the tip")
 #: Of the feed in the machine's X-Y plane.
 DIRECTION = Named(("+X", "-X", "+Y", "-Y"), Number("deg", _DEGREE, -360.0, 360.0), "an angle from +X")
 #: Cutting coefficients of a cut that is asked about.
@@ -175,7 +188,7 @@ ASKED_CUT = (
     Field("y_to", "y_to_mm", _SIDE, None, label="Block to", help="The other side, mm."),
     Field("engagement", "engagement", str, None, described="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up.",
           help="Angles between which the edge cuts at each height: z_mm, entry_angle_deg, exit_angle_deg."),
-    Field("lead", "lead_deg", Number("deg", _DEGREE, -89.0, 89.0), None,
+    Field("lead", "lead_deg", _LEAN, None,
           described="By which the tool leans towards the feed, with engagement.",
           help="How far the tool leans towards the feed, degrees; with {engagement}."),
     Field("feed_angle", "feed_direction", DIRECTION, "+X", described="Or degrees from +X.", help="+X -X +Y -Y, or degrees from +X."),
@@ -291,6 +304,61 @@ CAMPAIGN = (
     Field("softening_spread", "speed_softening_percent", Number("%", 1e-2, above=0.0, most=50.0), 3.0,
           described="Standard deviation of the stiffness's change from the middle of the speeds to their end."),
 )  # fmt: skip
+#: How a cutter was engaged, in files: by angles, by a radial depth, by a block's sides, or by a map.
+ENGAGEMENT = (
+    Field("entry", "entry_angle_deg", _ANGLE, None, described="At the cutter's diameter; with a shape, down and up milling are stepovers."),
+    Field("exit", "exit_angle_deg", _ANGLE, None),
+    Field("radial_depth", "radial_depth_mm", Number("mm", 1e-3, above=0.0), None, described="With strategy, instead of the angles."),
+    Field("strategy", "strategy", ("up", "down"), None),
+    Field("stock", "stock", ("stepover", "block"), None, described="What stood around the cutter."),
+    Field("y_from", "y_from_mm", _FAR, None, described="Of a block: its sides beside the cutter's path, along the normal direction."),
+    Field("y_to", "y_to_mm", _FAR, None),
+    Field("engagement", "engagement", str, None, described="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up."),
+    Field("lead", "lead_deg", _LEAN, 0.0, described="By which the tool leans in the direction of the feed, with engagement."),
+    Field("tilt", "tilt_deg", _LEAN, 0.0),
+)
+#: Recordings of a cut that was made.
+RECORDINGS = (
+    Field("recording", "cut", str, described="Recording of the cut; only the last part of a path counts, and its suffix is the format."),
+    Field("air", "air", str, None, described="Recording at the same speed without cutting; may serve several cuts."),
+)
+#: A cut that was made: `Cut` and its `CuttingConditions`.
+CUT = (
+    Field("id", "id", str),
+    Field("tooling", "tooling", str),
+    Field("spindle_speed", "spindle_speed_rpm", SPINDLE_SPEED),
+    Field("last_speed", "spindle_speed_to_rpm", SPINDLE_SPEED, None,
+          described="At which a pass ends whose speed changes evenly; null keeps the speed."),
+    Field("axial_depth", "axial_depth_mm", AXIAL_DEPTH),
+    Field("feed_per_tooth", "feed_per_tooth_mm", FEED_PER_TOOTH),
+    *ENGAGEMENT,
+    Field("feed_angle", "feed_direction", DIRECTION, described="+X, -X, +Y, -Y, or an angle from +X in degrees."),
+    Field("posture", "posture_deg", Many(Number("deg", _DEGREE)), None,
+          described="Of a robot's joints; an identification here takes cuts at one posture."),
+    Field("started", "started", str, None, described="When the recording began, as 2026-11-27T08:15:00."),
+    Field("temperature", "temperature_c", Number("°C", 1.0, -40.0, 200.0), None, described="Near the spindle's bearings."),
+    Field("validation", "validation", bool, False, described="The cut is predicted, and nothing is learned from it."),
+)  # fmt: skip
+#: What `correction` of an FRF does.
+CORRECTION = "Of a reversed sensor or hammer, of time as e^(-iωt), of exchanged columns; auto turns what is certain and says so."
+#: A receptance that a hammer has shown: `HammerTest`, whose band is told by its two ends.
+HAMMER_TEST = (
+    Field("id", "id", str),
+    Field("tooling", "tooling", str),
+    Field("axis", "axis", ("X", "Y")),
+    Field("response", "response", _POINT, described="tip, flange (the machine's side of it), or mm from the tip."),
+    Field("force", "force", _POINT, described="As response; one of the two is a point of tool or holder."),
+    Field("file", "file", str, described="File of the FRF; only the last part of a path counts, and its content says what it is."),
+    Field("record", "record", Number("", 1, 1, 100_000, whole=True), None, described="Which of several FRFs in the file."),
+    Field("units", "units", str, None, described="Of a file that tells none: a motion over a force, such as um/N."),
+    Field("standstill", "standstill", bool, True),
+    Field("sensor_mass", "sensor_mass_g", Number("g", 1e-3, 0.0, 1000.0), 0.0),
+    Field("low", "from_hz", Number("Hz", 1.0, 0.0, 1e6), 0.0),
+    Field("high", "to_hz", Number("Hz", 1.0, above=0.0, most=1e6), None),
+    Field("error", "error_percent", Number("%", 1e-2, 0.0, 100.0), 2.0,
+          described="By how much each line may be wrong beside its noise; 2 if left out."),
+    Field("correction", "correction", tuple(str(each) for each in Correction), "auto", described=CORRECTION),
+)  # fmt: skip
 
 #: Nouns whose keys are declared, by what they are called where all are told.
 NOUNS = {
@@ -302,4 +370,6 @@ NOUNS = {
     "workpiece": WORKPIECE,
     "sensor": SENSOR,
     "campaign": CAMPAIGN,
+    "cuts": (*CUT, *RECORDINGS),
+    "frfs": HAMMER_TEST,
 }
