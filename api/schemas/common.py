@@ -20,8 +20,6 @@ Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 #: Free text without control characters, which not every database accepts.
 Line = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
-#: What is done to a measured FRF, as `rcsa_ident.dynamics.passivity.Correction` names it.
-CorrectionName = Literal["auto", "none", "reverse", "conjugate", "conjugate-reverse", "exchange", "exchange-reverse"]
 #: Rows of a map of engagement, each a height and two angles.
 EngagementRows = Annotated[list[Annotated[list[float], Field(min_length=3, max_length=3)]], Field(min_length=1, max_length=1000)]
 #: Keys of a body or of a part of it, and items of one key.

@@ -1,4 +1,7 @@
-"""Keys that people write, each declared once: readers, writers, schemas, bodies of the service, options and the page are made of these."""
+"""Keys that people write, each declared once: readers, writers, schemas, bodies of the service, options and the page are made of these.
+
+Commands read it before they compute anything: it imports nothing heavy, and names choices where their nouns would bring in more.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +32,6 @@ from rcsa_ident.base.plausibility import (
 from rcsa_ident.base.plausibility import (
     CONTACT as CONTACT_RANGES,
 )
-from rcsa_ident.dynamics.passivity import Correction
-from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Role
 from rcsa_ident.tool_holder.spread import LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, Spread
 
 #: The default of a key that must be there.
@@ -128,6 +129,18 @@ class Field:
             return value
         number = self.number
         return value * number.size if isinstance(number, Range) or number.per == 1.0 else value / number.per
+
+    @property
+    def limits(self) -> tuple[float | None, float | None, float | None]:
+        """Least and most number [unit], and that which it lies above."""
+        number = self.number
+        return (*number.possible, None) if isinstance(number, Range) else (number.least, number.most, number.above)
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """Texts that are allowed, where not any is."""
+        kind = self.kind.names if isinstance(self.kind, Named) else self.kind
+        return kind if isinstance(kind, tuple) else ()
 
     @property
     def needed(self) -> Field:
@@ -269,13 +282,13 @@ WORKPIECE = (
 )  # fmt: skip
 #: A channel and what stands behind it: `Sensor`; a trigger has some of these keys.
 SENSOR = (
-    Field("quantity", "quantity", tuple(str(each) for each in CAMPAIGN_QUANTITIES)),
+    Field("quantity", "quantity", ("displacement", "acceleration", "trigger", "force")),
     Field("axis", "axis", ("X", "Y", "Z"), None),
     Field("sensitivity", "sensitivity", Number("signal per SI unit"), label="Sensitivity",
           described="Signal per quantity: V/m, V/(m/s^2), V/N; 1 where the file is in SI."),
     Field("delay", "delay_s", Number("s", 1.0, -1.0, 1.0), 0.0),
     Field("bandwidth", "bandwidth_hz", Number("Hz", above=0.0), None),
-    Field("role", "role", tuple(str(each) for each in Role), None, described="What an accelerometer is fixed to."),
+    Field("role", "role", ("spindle", "fixture", "table", "workpiece"), None, described="What an accelerometer is fixed to."),
     Field("mount_resonance", "mount_resonance_hz", Number("Hz", above=0.0), None, described="Of the sensor on its mount, a magnet or wax."),
     Field("rotation", "rotation_deg", Number("deg", _DEGREE, -180.0, 180.0), 0.0,
           described="Of what the sensor measures from its axis, about the spindle's, from +X towards +Y."),
@@ -339,7 +352,8 @@ CUT = (
     Field("temperature", "temperature_c", Number("°C", 1.0, -40.0, 200.0), None, described="Near the spindle's bearings."),
     Field("validation", "validation", bool, False, described="The cut is predicted, and nothing is learned from it."),
 )  # fmt: skip
-#: What `correction` of an FRF does.
+#: What is done to a measured FRF, and what that is.
+CORRECTIONS = ("auto", "none", "reverse", "conjugate", "conjugate-reverse", "exchange", "exchange-reverse")
 CORRECTION = "Of a reversed sensor or hammer, of time as e^(-iωt), of exchanged columns; auto turns what is certain and says so."
 #: A receptance that a hammer has shown: `HammerTest`, whose band is told by its two ends.
 HAMMER_TEST = (
@@ -357,7 +371,7 @@ HAMMER_TEST = (
     Field("high", "to_hz", Number("Hz", 1.0, above=0.0, most=1e6), None),
     Field("error", "error_percent", Number("%", 1e-2, 0.0, 100.0), 2.0,
           described="By how much each line may be wrong beside its noise; 2 if left out."),
-    Field("correction", "correction", tuple(str(each) for each in Correction), "auto", described=CORRECTION),
+    Field("correction", "correction", CORRECTIONS, "auto", described=CORRECTION),
 )  # fmt: skip
 
 #: Nouns whose keys are declared, by what they are called where all are told.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import subprocess
+import sys
 
 import pytest
 
@@ -13,6 +15,7 @@ from rcsa_ident.cli.conditions import cut_of
 from rcsa_ident.cli.options import CutOptions
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.stock import Immersion
+from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.setup.fields import (
     ASKED_CUT,
@@ -32,7 +35,7 @@ from rcsa_ident.setup.fields import (
     told_in_si,
 )
 from rcsa_ident.setup.machining_setup import Campaign, Workpiece, asked_cut
-from rcsa_ident.signals.recording import Sensor
+from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Role, Sensor
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread
 
@@ -52,6 +55,18 @@ WORN = {"wear_land_um": 80.0, "indentation": 1e14, "friction": 0.3}
 )
 def test_a_key_is_in_its_unit_and_the_noun_in_si(kind, written, meant):
     assert Field("a", "a_mm", kind).in_si(written) == meant
+
+
+def test_choices_are_those_of_their_nouns():
+    choices = {f"{noun}.{each.key}": each.choices for noun, fields in NOUNS.items() for each in fields}
+    assert choices["sensor.quantity"] == CAMPAIGN_QUANTITIES
+    assert choices["sensor.role"] == tuple(Role)
+    assert choices["frfs.correction"] == tuple(Correction)
+
+
+def test_declarations_cost_a_command_nothing():
+    code = "import sys, rcsa_ident.setup.fields; print('numpy' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"
 
 
 def test_what_is_not_told_is_left_to_the_noun():
