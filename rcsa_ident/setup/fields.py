@@ -14,6 +14,7 @@ from rcsa_ident.base.plausibility import (
     AXIAL_DEPTH,
     AXIAL_RATIO,
     DENSITY,
+    DIAMETER,
     EDGE,
     FEED_PER_TOOTH,
     INDENTATION,
@@ -32,6 +33,7 @@ from rcsa_ident.base.plausibility import (
 from rcsa_ident.base.plausibility import (
     CONTACT as CONTACT_RANGES,
 )
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.tool_holder.spread import LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, Spread
 
 #: The default of a key that must be there.
@@ -84,7 +86,7 @@ class Named:
     what: str
 
 
-#: What may stand under a key; a tuple are choices, and `str` and `bool` themselves.
+#: What may stand under a key; a tuple are choices, `str` and `bool` themselves, and `list` what its reader reads by hand.
 Kind = Range | Number | Many | Named | tuple[str, ...] | type
 
 
@@ -98,7 +100,7 @@ class Field:
         Of the noun's field, which is in SI.
     key : str
         In files and bodies of the service; options have ``-`` in place of ``_``.
-    kind : Range, Number, Many, Named, tuple of str, or str or bool themselves
+    kind : Range, Number, Many, Named, tuple of str, or str, bool or list themselves
     default : object
         As the key has it, in its unit; None is not told.
     described, help, label, hint : str
@@ -374,9 +376,52 @@ HAMMER_TEST = (
     Field("correction", "correction", CORRECTIONS, "auto", described=CORRECTION),
 )  # fmt: skip
 
+
+def _dimension(name: str, label: str, hint: str, described: str = "") -> Field:
+    """What draws a cutter's shape, in degrees or millimetres."""
+    angle = name in ("cutting_edge_angle", "taper")
+    kind = Number("deg", _DEGREE, above=0.0, most=179.0) if angle else Number("mm", 1e-3, above=0.0, most=10_000.0)
+    return Field(name, f"{name}_{'deg' if angle else 'mm'}", kind, None, label=label, hint=hint, described=described)
+
+
+#: What draws a cutter's shape beside its diameter and its corner radius: `Dimensions`.
+DIMENSIONS = (
+    _dimension("cutting_edge_angle", "Cutting edge angle", "KAPR, from the floor to the edge", "KAPR, from the floor to the edge."),
+    _dimension("taper", "Angle from the axis", "Taper of each side", "From the axis to the edge."),
+    _dimension("largest_diameter", "Largest diameter", "DCX, where the edge ends", "DCX, where the edge ends."),
+    _dimension("cutting_depth", "Edge height", "APMX, from the tip to its end", "APMX, from the tip to where the edge ends."),
+    _dimension("wiper", "Wiper", "BS, the flat beside the corner", "BS, length of the flat beside the corner."),
+    _dimension("profile_radius", "Profile radius", "Of the long arc", "PRFRAD, of the long arc."),
+    _dimension("axial_distance", "Axial distance", "From the tip to where it is widest", "From the tip to where a barrel is widest."),
+    _dimension("upper_radius", "Upper radius", "At the edge's upper end"),
+    _dimension("tip_diameter", "Tip diameter", "Of the floor; empty: a point or a ball"),
+    _dimension("neck_diameter", "Neck diameter", "Behind the ball"),
+    _dimension("tip_length", "Tip length", "Of the straight edge below the arc"),
+)
+#: What cuts: `Cutter`; lists of one number a tooth are read by hand.
+CUTTER = (
+    Field("teeth", "teeth", Number("", 1, 1, 100, whole=True), label="Teeth"),
+    Field("diameter", "diameter_mm", DIAMETER, label="Cutting diameter"),
+    Field("helix", "helix_deg", list, 0.0, described="One angle, or one a tooth."),
+    Field("helix_kind", "helix_kind", ("lead", "angle"), "lead",
+          described="lead, or angle where the edge stands at one angle to the axis at any radius."),
+    Field("pitch", "pitch_deg", list, None),
+    Field("shape", "shape", tuple(str(each) for each in CutterShape), "flat",
+          described=f"One of {', '.join(CutterShape)}; flat without it. Without the keys that draw it, it is computed as a cylinder."),
+    Field("corner_radius", "corner_radius_mm", Number("mm", 1e-3, 0.0, 1000.0), 0.0, label="Corner radius", hint="RE"),
+    *DIMENSIONS,
+    Field("profile", "profile", list, None,
+          described="Points r, z from the tip up, and the radius of the arc to each where it is one."),
+    Field("serration", "serration", list, None),
+    Field("runout", "runout_mm", list, None),
+    Field("axial_runout", "axial_runout_mm", list, None),
+    Field("tilt", "tilt_deg", Number("deg", _DEGREE, -1.0, 1.0), 0.0),
+)  # fmt: skip
+
 #: Nouns whose keys are declared, by what they are called where all are told.
 NOUNS = {
     "cut": ASKED_CUT,
+    "cutter": CUTTER,
     "segment": SEGMENT,
     "contact": CONTACT,
     "material": MATERIAL,

@@ -14,6 +14,8 @@ from rcsa_ident.base.plausibility import Range
 from rcsa_ident.cli.conditions import cut_of
 from rcsa_ident.cli.options import CutOptions
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.cutter import HelixKind
+from rcsa_ident.cutting.outlines import Dimensions
 from rcsa_ident.cutting.stock import Immersion
 from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.validated_table import Table
@@ -22,6 +24,7 @@ from rcsa_ident.setup.fields import (
     CAMPAIGN,
     COEFFICIENTS,
     CONTACT,
+    DIMENSIONS,
     MATERIAL,
     NEEDED,
     NOUNS,
@@ -61,6 +64,7 @@ def test_choices_are_those_of_their_nouns():
     choices = {f"{noun}.{each.key}": each.choices for noun, fields in NOUNS.items() for each in fields}
     assert choices["sensor.quantity"] == CAMPAIGN_QUANTITIES
     assert choices["sensor.role"] == tuple(Role)
+    assert choices["cutter.helix_kind"] == tuple(HelixKind)
     assert choices["frfs.correction"] == tuple(Correction)
 
 
@@ -123,8 +127,8 @@ def test_a_reader_takes_both_ends_of_a_key_and_refuses_what_is_beyond_in_one_sen
 
 
 OF_NOUNS = [
-    (Spread, SPREAD), (Contact, CONTACT), (Material, MATERIAL), (BeamSegment, SEGMENT), (CuttingCoefficients, WORKPIECE[1:-1]),
-    (Workpiece, (WORKPIECE[0], WORKPIECE[-1])), (Sensor, SENSOR), (Campaign, CAMPAIGN),
+    (Spread, SPREAD), (Contact, CONTACT), (Material, MATERIAL), (Dimensions, DIMENSIONS), (BeamSegment, SEGMENT),
+    (CuttingCoefficients, WORKPIECE[1:-1]), (Workpiece, (WORKPIECE[0], WORKPIECE[-1])), (Sensor, SENSOR), (Campaign, CAMPAIGN),
 ]  # fmt: skip
 
 
@@ -137,6 +141,6 @@ def test_a_key_that_is_left_out_is_what_its_noun_takes_then(noun, fields):
             assert each.in_si(each.default) == own[each.name]
 
 
-@pytest.mark.parametrize(("noun", "fields"), OF_NOUNS[:5], ids=[noun.__name__ for noun, _ in OF_NOUNS[:5]])
+@pytest.mark.parametrize(("noun", "fields"), OF_NOUNS[:6], ids=[noun.__name__ for noun, _ in OF_NOUNS[:6]])
 def test_a_noun_of_numbers_has_a_key_for_each(noun, fields):
     assert {each.name for each in fields} == {each.name for each in dataclasses.fields(noun) if each.compare}

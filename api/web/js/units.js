@@ -80,7 +80,7 @@ const KINDS = {
 };
 
 /** The kind of what a declared unit is of. */
-export const kindOf = (unit) => ({ mm: "length", "%": "percent" })[unit] ?? "none";
+export const kindOf = (unit) => ({ mm: "length", deg: "degree", "%": "percent" })[unit] ?? "none";
 
 let inch = false;
 try {

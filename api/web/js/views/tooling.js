@@ -32,7 +32,7 @@ export async function view({ name = "" }, query, place) {
   };
   const helix = h("input", { autocomplete: "off", placeholder: "0" });
   helix.value = [keys.cutter.helix_deg ?? 0].flat().join(", ");
-  const shape = cutterShape(keys.cutter);
+  const shape = cutterShape(nouns.cutter, keys.cutter);
   const pitch = h("input", { autocomplete: "off", placeholder: "equal" });
   pitch.value = (keys.cutter.pitch_deg ?? []).join(", ");
   const stickout = quantity("Stickout", "length", keys.tool.stickout_mm, { name: "tool.stickout_mm", hint: "Tip to the holder's face" });
