@@ -19,6 +19,8 @@ from rcsa_ident.cutting.outlines import Dimensions
 from rcsa_ident.cutting.stock import Immersion
 from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.validated_table import Table
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Workpiece, asked_cut
 from rcsa_ident.setup.fields import (
     ASKED_CUT,
     CAMPAIGN,
@@ -37,7 +39,6 @@ from rcsa_ident.setup.fields import (
     Number,
     told_in_si,
 )
-from rcsa_ident.setup.machining_setup import Campaign, Workpiece, asked_cut
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Role, Sensor
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread

@@ -10,8 +10,9 @@ import numpy as np
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.validated_table import Table
+from rcsa_ident.setup.campaign import HammerTest
 from rcsa_ident.setup.fields import HAMMER_TEST, keys_of, told_in_si
-from rcsa_ident.setup.machining_setup import HammerTest, Tooling
+from rcsa_ident.setup.tooling import Tooling
 
 HAMMER_TEST_KEYS = keys_of(HAMMER_TEST)
 _OWN = {each.key: each for each in HAMMER_TEST}

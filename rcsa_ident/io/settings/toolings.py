@@ -12,7 +12,7 @@ from rcsa_ident.io.settings.cutters import cutter_keys
 from rcsa_ident.io.settings.setups import material_keys, spread_keys
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.setup.fields import CONTACT, keys_of
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread

@@ -6,8 +6,8 @@ from typing import Any
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.io.validated_table import Table
+from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.setup.fields import WORKPIECE, keys_of, told_in_si
-from rcsa_ident.setup.machining_setup import Workpiece
 
 WORKPIECE_KEYS = keys_of(WORKPIECE)
 _NAME, *_COEFFICIENTS, _UNTOLD_EDGE = WORKPIECE
