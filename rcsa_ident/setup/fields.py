@@ -30,9 +30,7 @@ from rcsa_ident.base.plausibility import (
     WEAR_LAND,
     Range,
 )
-from rcsa_ident.base.plausibility import (
-    CONTACT as CONTACT_RANGES,
-)
+from rcsa_ident.base.plausibility import CONTACT as CONTACT_RANGES
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.tool_holder.spread import LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, Spread
 
