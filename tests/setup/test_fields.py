@@ -18,6 +18,7 @@ from rcsa_ident.cutting.cutter import HelixKind
 from rcsa_ident.cutting.outlines import Dimensions
 from rcsa_ident.cutting.stock import Immersion
 from rcsa_ident.dynamics.passivity import Correction
+from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.setup.cut import Workpiece, asked_cut
@@ -66,6 +67,7 @@ def test_choices_are_those_of_their_nouns():
     assert choices["sensor.quantity"] == CAMPAIGN_QUANTITIES
     assert choices["sensor.role"] == tuple(Role)
     assert choices["cutter.helix_kind"] == tuple(HelixKind)
+    assert choices["cuts.feed_direction"] == choices["cut.feed_direction"] == tuple(FEED_DIRECTIONS)
     assert choices["frfs.correction"] == tuple(Correction)
 
 
