@@ -13,8 +13,9 @@ import numpy as np
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisParameters, Layout, Unknowns, pack, unpack, with_mode, without_mode
+from rcsa_ident.identification.modal_parameters import ModalParameters
 from rcsa_ident.identification.progress import Stage
+from rcsa_ident.identification.unknowns import Layout, Unknowns, pack, unpack
 
 #: Walks down end where the evidence lies this far behind the best seen: nothing below comes back from there. The second one is
 #: for a model that a walk has ended with before.
@@ -30,6 +31,8 @@ NEW_DAMPING = (0.015, 0.06, 0.25)
 PLACES = 30
 #: Modes whose frequencies lie closer than this ratio may be one.
 CLOSE = 1.2
+#: New modes that are tried at a time where every line feels all of them.
+PROMISING = 4
 
 #: Told of a stage, the cost or evidence that it came to, and its solution.
 Report = Callable[[Stage, float, Solution], None]
@@ -85,7 +88,9 @@ class _PlaneSteps:
         for i, part in enumerate(layout.axes):
             axis = unpack(solution.theta[layout.axis(i)], part)
             if axis.order > smallest:
-                trials += [_with_axis(solution, i, each) for each in [without_mode(axis, m) for m in range(axis.order)] + merged(axis)]
+                left_out = [(axis, k) for k in range(axis.order)]
+                left_out += [(merged(axis, low, high), high) for low, high in close_pairs(axis)]
+                trials += [_with_axis(solution, i, each.without_mode(k)) for each, k in left_out]
         return trials
 
     def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
@@ -204,7 +209,7 @@ def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float],
     return solution
 
 
-def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float], count: int = 3) -> list[AxisParameters]:
+def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float], count: int = 3) -> list[ModalParameters]:
     """Return axis `i` with one more mode, at the frequencies where the linearised misfit promises most.
 
     A mode with shape psi adds psi psi^T / (omega_n^2 - omega^2 + 2 i zeta omega_n omega) to the flange's receptance: linear in
@@ -227,7 +232,7 @@ def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, 
     assert isinstance(layout, Layout)
     places = new_modes(solution, misfit, (i,), band_hz, count)
     axis = unpack(solution.theta[layout.axis(i)], layout.axes[i])
-    return [with_mode(axis, omega_n, (float(shape[0]), float(shape[1])), zeta) for omega_n, zeta, shape in places]
+    return [axis.with_mode(omega_n, shape, zeta) for omega_n, zeta, shape in places]
 
 
 def new_modes(
@@ -278,21 +283,22 @@ def new_modes(
     return [(float(frequency[k]), float(damping[k]), shapes[k]) for k in chosen]
 
 
-def merged(axis: AxisParameters) -> list[AxisParameters]:
-    """Return the axis with each two neighbours that stand close made one: together they may do what one mode does."""
-    order = np.argsort(axis.omega_n, kind="stable")
-    found = []
-    for low, high in pairwise(order.tolist()):
-        if axis.omega_n[high] < CLOSE * axis.omega_n[low]:
-            both = axis.psi[[low, high]]
-            psi, omega_n, places = axis.psi.copy(), axis.omega_n.copy(), axis.places.copy()
-            psi[low] = rank_one(np.array([both[:, 0] @ both[:, 0], both[:, 0] @ both[:, 1], both[:, 1] @ both[:, 1]]))
-            # both modes' motion of the other places, and whichever sign the new shape has
-            places[low] = (axis.places[[low, high]].T @ both) @ psi[low] / (psi[low] @ psi[low])
-            share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
-            omega_n[low] = np.exp(share @ np.log(axis.omega_n[[low, high]]))
-            found.append(without_mode(replace(axis, psi=psi, omega_n=omega_n, places=places), high))
-    return found
+def close_pairs(machine: ModalParameters) -> list[tuple[int, int]]:
+    """Return each two modes that are neighbours and stand close, by frequency."""
+    order = np.argsort(machine.omega_n, kind="stable")
+    return [(low, high) for low, high in pairwise(order.tolist()) if machine.omega_n[high] < CLOSE * machine.omega_n[low]]
+
+
+def merged(machine: ModalParameters, low: int, high: int) -> ModalParameters:
+    """Return the machine whose mode `low` does, as well as one can, what `low` and `high` do; `high` is still there."""
+    both = machine.psi[[low, high]]
+    psi, omega_n, places = machine.psi.copy(), machine.omega_n.copy(), machine.places.copy()
+    psi[low] = rank_one(np.array([both[:, i] @ both[:, j] for i, j in zip(*np.triu_indices(both.shape[1]), strict=True)]))
+    # both modes' motion of the other places, and whichever sign the new shape has
+    places[low] = (machine.places[[low, high]].T @ both) @ psi[low] / (psi[low] @ psi[low])
+    share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
+    omega_n[low] = np.exp(share @ np.log(machine.omega_n[[low, high]]))
+    return replace(machine, psi=psi, omega_n=omega_n, places=places)
 
 
 def rank_one(entries: FloatArray) -> FloatArray:
@@ -312,7 +318,7 @@ def _polished(trials: list[Solution], misfit: Misfit, count: int, steps: int = 3
     return min((refine(misfit, t.theta, t.layout, t.evaluation.nuisance, steps) for t in near), key=lambda s: s.cost)
 
 
-def _with_axis(solution: Solution, i: int, axis: AxisParameters) -> Trial:
+def _with_axis(solution: Solution, i: int, axis: ModalParameters) -> Trial:
     """The vector with another axis in place of axis `i`."""
     old = solution.layout
     assert isinstance(old, Layout)

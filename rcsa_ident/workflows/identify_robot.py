@@ -16,8 +16,8 @@ from rcsa_ident.cutting.force import axial_and_slope
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.identification.arm.data import PosedData, check_postures, posed_data
 from rcsa_ident.identification.arm.fit import fit_robot
-from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.result import RobotCode, RobotIdentification, answer
+from rcsa_ident.identification.arm.unknowns import arm_priors
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.model_order import Report
 from rcsa_ident.identification.rough_data import without_distances

@@ -17,8 +17,8 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.arm.data import body_masses
-from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.static import REPEATABILITY, StaticTests, expected_information
+from rcsa_ident.identification.arm.unknowns import arm_priors
 from rcsa_ident.identification.experiment_design import d_optimal
 from rcsa_ident.machine.robot.compliance import twist_per_payload
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of

@@ -19,16 +19,15 @@ from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.arm.data import PosedData
 from rcsa_ident.identification.arm.misfit import PosedMisfit
 from rcsa_ident.identification.arm.modes import POSED, layout_of
-from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, pack, unpack
-from rcsa_ident.identification.arm.priors import ArmPriors
 from rcsa_ident.identification.arm.spindle_starts import drawn, spindle_of
+from rcsa_ident.identification.arm.unknowns import ArmPriors, PosedLayout, pack, unpack
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.joint_fit import refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.model_order import Report, evidence, grow_modes
-from rcsa_ident.identification.parameters import Unknowns
 from rcsa_ident.identification.progress import Stage
 from rcsa_ident.identification.task import Phase, finite, perform
+from rcsa_ident.identification.unknowns import DIRECTIONS, Unknowns
 
 #: Up to which frequency a spindle is as good as rigid [Hz].
 ARM_BAND = 120.0
@@ -175,7 +174,7 @@ def _arm(data: PosedData, priors: ArmPriors, rng: np.random.Generator, map: Map)
     draws = np.concatenate([np.zeros((1, priors.centre.size)), rng.standard_normal((STARTS - 1, priors.centre.size))])
     rest = [
         _FIRST_RESIDUAL * np.eye(DIRECTIONS)[np.tril_indices(DIRECTIONS)],
-        np.log(priors.spindle.joint),
+        np.log(priors.joint),
         np.zeros(len(data.base.coefficient_spread)),
     ]
     starts = [ArmStart(low, priors, np.concatenate([priors.centre + draw * priors.spread, *rest])) for draw in draws]

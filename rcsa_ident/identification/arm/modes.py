@@ -6,14 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcsa_ident.identification.arm.parameters import PosedLayout, SpindleParameters, pack, unpack
+from rcsa_ident.identification.arm.unknowns import PosedLayout, pack, unpack
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.model_order import Trial, new_modes
-from rcsa_ident.identification.parameters import Unknowns
-
-#: New modes that are tried at a time.
-PROMISING = 4
+from rcsa_ident.identification.modal_parameters import ModalParameters
+from rcsa_ident.identification.model_order import PROMISING, Trial, new_modes
+from rcsa_ident.identification.unknowns import Unknowns
 
 
 class PosedGrowth:
@@ -41,11 +39,11 @@ def layout_of(layout: Unknowns) -> PosedLayout:
     return layout
 
 
-def _spindle(solution: Solution) -> SpindleParameters:
+def _spindle(solution: Solution) -> ModalParameters:
     return unpack(solution.theta, layout_of(solution.layout)).spindle
 
 
-def _with(solution: Solution, spindle: SpindleParameters) -> Trial:
+def _with(solution: Solution, spindle: ModalParameters) -> Trial:
     old = layout_of(solution.layout)
     robot = replace(unpack(solution.theta, old), spindle=spindle)
     return np.concatenate([pack(robot, old), solution.theta[old.tail :]]), replace(old, modes=spindle.order)
