@@ -143,7 +143,7 @@ class CutConditions(BaseModel):
     lead_deg: float | None = Field(None, description="By which the tool leans in the direction of the feed, with engagement.")
     tilt_deg: float | None = None
     feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
-    posture_deg: list[float] | None = Field(None, description="Of a robot's joints; an identification here takes cuts at one posture.")
+    posture_deg: list[float] | None = Field(None, description="Of a robot's joints; an identification of the robot asks for it.")
     started: str | None = Field(None, description="When the recording began, as 2026-11-27T08:15:00.")
     temperature_c: float | None = Field(None, description="Near the spindle's bearings.")
     validation: bool | None = Field(None, description="The cut is predicted, and nothing is learned from it.")
