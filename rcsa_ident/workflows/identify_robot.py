@@ -104,12 +104,12 @@ class _Beside:
         return {name: (rod_poles(each, highest), rod_poles(each, highest, twisting=True)) for name, each in assemblies.items()}
 
     def rods(self, cut: int, omega: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Of `posed.data.Rods`."""
+        """Of `arm.data.Rods`."""
         along, about = (each.receptance(omega).values for each in self._poles[self.data.toolings[self.data.cut_tooling[cut]]])
         return along[:, 1, 1], about[:, 1, 1], along[:, 1, 0]
 
     def axial(self, cut: int, orders: np.ndarray) -> tuple[ComplexArray, ComplexArray]:
-        """Of `posed.data.Axial`."""
+        """Of `arm.data.Axial`."""
         made = self.cuts[self.data.cut_ids[cut]]
         cutter = self.campaign.toolings[made.tooling].cutter
         force, slope = axial_and_slope(cutter, made.conditions, self.campaign.coefficients, orders)

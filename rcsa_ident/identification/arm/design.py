@@ -144,7 +144,7 @@ def stable_cuts(robot: RobotModel, noise: float = CUT_NOISE) -> Experiment:
     """Return slow stable cuts, as `identify_robot` takes them: the flange's motion along X and Y at lines of the arm's own band.
 
     Unknowns are compliances, logarithms of dampers and of the masses of links and payload, in units of what is believed of them
-    (`posed.priors`). Forces are those of half an immersion, fed along the tool's x; faster cuts tell the spindle, wherever they are made.
+    (`arm_priors`). Forces are those of half an immersion, fed along the tool's x; faster cuts tell the spindle, wherever they are made.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ class DrawnSpindles:
     priors : ArmPriors
     arm : Candidate
     numbers : array, shape (d, 11)
-        As `likely_spindles.drawn` returns them.
+        As `spindle_starts.drawn` returns them.
     """
 
     phase: ClassVar[Phase] = Phase.COUPLED
