@@ -59,11 +59,6 @@ class Block(Protocol):
         """How many they are."""
         ...
 
-    @property
-    def modes(self) -> int:
-        """Modes among them that may be exchanged with each other without changing anything."""
-        ...
-
     def known(self, priors: Priors) -> tuple[FloatArray, FloatArray]:
         """Return what is known of them beforehand: centres and standard deviations, shape (size,) each."""
         ...
@@ -321,9 +316,18 @@ class Unknowns(ABC):
         return self.places[-1].stop
 
     @property
+    def modal(self) -> tuple[tuple[int, ModalBlock], ...]:
+        """The blocks of modes with their number among all; the modes of one may be exchanged with each other without changing anything."""
+        return tuple((k, block) for k, block in enumerate(self.blocks) if isinstance(block, ModalBlock))
+
+    @property
     def modes_of_axes(self) -> tuple[int, ...]:
-        """Numbers of modes that may be exchanged with each other without changing anything."""
-        return tuple(block.modes for block in self.blocks if block.modes)
+        """Numbers of modes of these blocks."""
+        return tuple(block.modes for _, block in self.modal)
+
+    @abstractmethod
+    def with_modes(self, k: int, modes: int) -> Unknowns:
+        """Return the layout with another number of modes in block `k`."""
 
     @cached_property
     def size(self) -> int:
@@ -372,6 +376,10 @@ class Layout(Unknowns):
         """Return the part of an axis."""
         return self.places[i]
 
+    def with_modes(self, k: int, modes: int) -> Layout:
+        """Return the layout with another number of modes of an axis."""
+        return replace(self, axes=tuple(replace(axis, modes=modes) if i == k else axis for i, axis in enumerate(self.axes)))
+
 
 @dataclass(frozen=True)
 class CoupledLayout(Unknowns):
@@ -409,6 +417,11 @@ class CoupledLayout(Unknowns):
     def blocks(self) -> tuple[Block, ...]:
         """The machine alone."""
         return (self.block,)
+
+    def with_modes(self, k: int, modes: int) -> CoupledLayout:
+        """Return the layout with another number of modes."""
+        del k
+        return replace(self, modes=modes)
 
     @property
     def flange(self) -> CoupledLayout:

@@ -244,7 +244,7 @@ def test_border_is_that_of_the_dense_augmented_problem(case, i):
 
 
 def test_compliance_is_the_change_with_the_flange(case):
-    """What `promising` puts a new mode on: d residual / d (tt, tr, rr) of the flange's receptance."""
+    """What `model_order.more` puts a new mode on: d residual / d (tt, tr, rr) of the flange's receptance."""
     layout = case.layout.axes[0]
     first = case.layout.axis(0).start + layout.core - 3
     axis_factor = case.theta[first : first + 3] * np.sqrt(1e-9)

@@ -16,7 +16,7 @@ from rcsa_ident.identification.model_order import (
     grow_modes,
     merged,
     model_error,
-    promising,
+    more,
 )
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
@@ -89,10 +89,15 @@ def poor(request, known, theta):
     return request.param, found
 
 
+def more_of(solution, misfit, i, band):
+    """An axis with one mode more."""
+    return [unpack(theta[layout.axis(i)], layout.axes[i]) for theta, layout in more(solution, misfit, i, band)]
+
+
 def test_a_mode_that_was_taken_out_is_the_most_promising(known, poor):
     _, misfit, _ = known
     missing, solution = poor
-    found = promising(solution, misfit, 0, BAND)
+    found = more_of(solution, misfit, 0, BAND)
     assert 1 <= len(found) <= 3
     assert all(axis.order == 3 for axis in found)
     # the grid's step is 15 %
@@ -112,7 +117,7 @@ def test_promise_of_a_weak_mode_is_kept(known, theta, place):
     lines, delay = remade(known[0], np.concatenate([pack(more), theta[-4:]]), flange_layout(4), np.random.default_rng(3), noise=0.0)
     misfit = Misfit(lines, Priors(), (1e-3,))
     without = refine(misfit, theta, TRUE, np.stack([delay, 0.0 * delay], axis=1), 60)
-    first = promising(without, misfit, 0, BAND)[0]
+    first = more_of(without, misfit, 0, BAND)[0]
     assert first.omega_n[0] / (2.0 * np.pi) == pytest.approx(frequency, rel=1e-9)
     sign = np.sign(first.psi[0] @ shape)
     np.testing.assert_allclose(sign * first.psi[0], shape, rtol=0.15)
@@ -135,7 +140,7 @@ def test_promising_with_everything_unknown(rich):
     left = pack(unpack(theta[layout.axis(0)], axes[0]).without_mode(1), poor_axes[0])
     vector = np.concatenate([left, theta[layout.axis(0).stop :]])
     poor = refine(misfit, vector, replace(layout, axes=poor_axes), np.stack([delay, 0.0 * delay], axis=1), 0)
-    found = promising(poor, misfit, 0, BAND)
+    found = more_of(poor, misfit, 0, BAND)
     assert abs(np.log(found[0].omega_n[0] / (2.0 * np.pi * 1400.0))) < 0.15
     assert found[0].softening.shape == (3, 3)
     assert found[0].places.shape == (3, 1)

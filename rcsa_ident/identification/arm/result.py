@@ -11,9 +11,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark, RemarkCode
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.identification.arm.misfit import PosedMisfit
-from rcsa_ident.identification.arm.modes import layout_of
 from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
-from rcsa_ident.identification.arm.unknowns import stiffening, unpack
+from rcsa_ident.identification.arm.unknowns import posed, stiffening, unpack
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.robot.model import RobotModel
@@ -106,7 +105,7 @@ def answer(
     postures : array, shape (c, j) [rad]
     """
     covariance = np.linalg.inv(found.evaluation.hessian)
-    layout, data = layout_of(found.layout), misfit.data
+    layout, data = posed(found.layout), misfit.data
     own = layout.machine
     prior = misfit.rows(layout).spread
     best, other = (_unknowns(each) for each in (found, rival))
@@ -119,7 +118,7 @@ def answer(
 
 
 def _unknowns(solution: Solution) -> RobotUnknowns:
-    layout = layout_of(solution.layout)
+    layout = posed(solution.layout)
     return RobotUnknowns(solution.theta[layout.machine], replace(layout, coefficients=0, clampings=0))
 
 

@@ -11,7 +11,7 @@ weighs there. Lengths of the arm are known.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -83,11 +83,6 @@ class ArmBlock:
         """Length of the block."""
         return 2 * self.freedoms + self.masses
 
-    @property
-    def modes(self) -> int:
-        """None of it may be exchanged."""
-        return 0
-
     @cached_property
     def parts(self) -> Mapping[str, slice]:
         """Places of each kind of unknown."""
@@ -142,6 +137,11 @@ class PosedLayout(Unknowns):
         """Arm and spindle."""
         return self.arm, self.spindle
 
+    def with_modes(self, k: int, modes: int) -> PosedLayout:
+        """Return the layout with another number of modes of the spindle."""
+        del k
+        return replace(self, modes=modes)
+
     @property
     def machine(self) -> slice:
         """Places of all but forces and tooth angles."""
@@ -165,6 +165,12 @@ class RobotParameters:
     damping: FloatArray
     heavier: FloatArray
     spindle: ModalParameters
+
+
+def posed(layout: Unknowns) -> PosedLayout:
+    """Return the layout as a robot's, which it is known to be."""
+    assert isinstance(layout, PosedLayout)
+    return layout
 
 
 def unpack(theta: FloatArray, layout: PosedLayout) -> RobotParameters:

@@ -12,7 +12,6 @@ from rcsa_ident.base.scaleout import Map
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.coupled.data import CoupledData
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.modes import COUPLED
 from rcsa_ident.identification.coupled.score import coupled_start
 from rcsa_ident.identification.joint_fit import ROUGHLY, AxisSearch, refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
@@ -136,8 +135,8 @@ class CoupledWalk:
             other = refine(misfit, *turned_round(found), 60, tolerance=ROUGHLY)
             if evidence(other, misfit) < evidence(found, misfit) - OTHER_SENSE:
                 found = other
-        found = drop_modes(found, misfit, steps=COUPLED)
-        found = exchange_modes(found, misfit, self.data.base.band_hz, rounds=1, steps=COUPLED)
+        found = drop_modes(found, misfit)
+        found = exchange_modes(found, misfit, self.data.base.band_hz, rounds=1)
         return CoupledSearch(found.candidate, evidence(found, misfit), misfit.model_error, misfit.cut_weight)
 
 
@@ -253,7 +252,7 @@ def fit_coupled(data: CoupledData, priors: Priors, best: CoupledSearch, report: 
     for _ in range(1 + ADDED):
         found, misfit = learned(start.point, misfit.model_error, misfit.cut_weight, WELL)
         # all outputs may show a mode that the flange's own motion does not
-        grown = grow_modes(found, misfit, data.base.band_hz, steps=COUPLED)
+        grown = grow_modes(found, misfit, data.base.band_hz)
         report(Stage.GROW, grown.cost, grown)
         if evidence(grown, misfit) >= evidence(found, misfit) - 1.0:
             break

@@ -6,9 +6,8 @@ import pytest
 from rcsa_ident.identification.coupled.data import coupled_data
 from rcsa_ident.identification.coupled.fit import with_discs, with_softening
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.modes import COUPLED
 from rcsa_ident.identification.levenberg_marquardt import refine
-from rcsa_ident.identification.model_order import exchange_modes
+from rcsa_ident.identification.model_order import exchange_modes, fewer, more
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.unknowns import CoupledLayout, pack, unpack
 from tests.identification.coupled.models import coupled_vector, dense_receptance
@@ -109,7 +108,7 @@ def missing(plain):
 @pytest.mark.slow
 def test_the_missing_mode_is_promised_and_found(missing):
     misfit, solution, band, omega_n = missing
-    trials = COUPLED.more(solution, misfit, 0, band)
+    trials = more(solution, misfit, 0, band)
     assert {layout for _, layout in trials} == {replace(solution.layout, modes=5)}
     assert all(theta.size == layout.size for theta, layout in trials)
     places = np.exp([theta[0] for theta, _ in trials])
@@ -119,7 +118,7 @@ def test_the_missing_mode_is_promised_and_found(missing):
         old, new = unpack(solution.theta, solution.layout.block), unpack(theta, layout.block)
         np.testing.assert_allclose(new.skew[1:, 1:], old.skew, rtol=1e-12)
         assert not new.skew[0].any()
-    found = exchange_modes(solution, misfit, band, rounds=1, steps=COUPLED)
+    found = exchange_modes(solution, misfit, band, rounds=1)
     assert found.cost < 0.2 * solution.cost
     assert found.layout.modes == 5
 
@@ -128,11 +127,10 @@ def test_the_missing_mode_is_promised_and_found(missing):
 def test_fewer_modes_keep_what_is_shared(missing):
     misfit, solution, _, _ = missing
     del misfit
-    trials = COUPLED.fewer(solution, 1)
+    trials = fewer(solution, 1)
     assert len(trials) >= 4
     for theta, layout in trials:
         assert layout == replace(solution.layout, modes=3)
         np.testing.assert_array_equal(theta[layout.tail :], solution.theta[solution.layout.tail :])
     # two of a plane are the fewest
-    assert COUPLED.fewer(solution, 2) == []
-    assert COUPLED.groups(solution.layout) == 1
+    assert fewer(solution, 2) == []
