@@ -84,7 +84,7 @@ def use(process: int) -> tuple[float, float]:
     """Return the seconds of a core that a process and its descendants have taken, and their memory [MB]; zeros where nobody tells."""
     mine = {process} | others(process)
     ticks = sum(int(field) for id in mine for field in (_stat(id) or ["0"] * 13)[11:13])
-    return ticks / os.sysconf("SC_CLK_TCK"), sum(_memory(id) for id in mine)
+    return ticks / os.sysconf("SC_CLK_TCK"), sum(memory(id) for id in mine)
 
 
 def others(process: int) -> set[int]:
@@ -108,7 +108,7 @@ def _stat(process: int) -> list[str]:
         return []
 
 
-def _memory(process: int) -> float:
+def memory(process: int) -> float:
     """What a process has in memory; of pages that several share, its part [MB]."""
     try:
         lines = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="utf-8").splitlines()
