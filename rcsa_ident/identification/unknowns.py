@@ -214,7 +214,7 @@ def unpack(part: FloatArray, block: ModalBlock) -> ModalParameters:
     lower[diagonal] = DAMPING_UNIT * np.exp(of["damping"][diagonal])
     factor, residual = np.zeros((m, m)), np.zeros((d, d))
     factor[rows, cols] = lower
-    residual[np.tril_indices(d)] = RESIDUAL_UNIT * of["residual"]
+    residual[lower_triangle(d)[:2]] = RESIDUAL_UNIT * of["residual"]
     beside = of["places"].reshape(block.places, m + d)
     softening = skew = np.zeros((0, 0))
     if block.softening:
@@ -259,7 +259,7 @@ def pack(machine: ModalParameters, block: ModalBlock | None = None, discs: Float
         "shapes": machine.psi.ravel(),
         "pulls": machine.pull.ravel(),
         "damping": lower,
-        "residual": machine.residual[np.tril_indices(d)] / RESIDUAL_UNIT,
+        "residual": machine.residual[lower_triangle(d)[:2]] / RESIDUAL_UNIT,
         "places": beside.ravel(),
         "standstill": machine.standstill,
         "softening": machine.softening[rows, cols] if machine.softening.size else None,
