@@ -49,14 +49,19 @@ def identification_of(components: Components, group: str, id: str) -> Document:
     return found_or_404(components.store.identifications.get(group, id), "identification of the machine")
 
 
+def robot_text(components: Components, group: str, name: str) -> str:
+    """Return ROBOT.toml of a robot that is kept, else of a published one."""
+    if (kept := components.store.robots.get(group, name)) is not None:
+        return kept.text
+    return found_or_404(sample_robots().get(name), f"robot {name}").read_text(encoding="utf-8")
+
+
 def posed_robot(components: Components, group: str, asked: Posed) -> MachineText:
     """Return a robot at a posture: one that is kept, else a published one, or as it came."""
     if isinstance(asked.robot, RobotKeys):
         keys = asked.robot.model_dump(exclude_unset=True, exclude_none=True)
-    elif (kept := components.store.robots.get(group, asked.robot)) is not None:
-        keys = parsed(kept.text)
     else:
-        keys = parsed(found_or_404(sample_robots().get(asked.robot), f"robot {asked.robot}").read_text(encoding="utf-8"))
+        keys = parsed(robot_text(components, group, asked.robot))
     text = posed_text(keys, asked.posture_deg, asked.joints_only)
     return MachineText(digest_of(text), text)
 

@@ -48,6 +48,7 @@ STUDIES = (
     "streaming",
     "live_chart",
     "durability",
+    "soak",
     "recommendation",
     "reading",
     "hostile",

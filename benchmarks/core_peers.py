@@ -31,8 +31,8 @@ from rcsa_ident.dynamics.rational import rational_fit
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import flange_layout
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import flange_layout
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.uff import UffAxis, UffFunction, read_uff, write_uff
 from rcsa_ident.signals.spectra import line_spectrum

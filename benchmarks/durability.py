@@ -1,10 +1,11 @@
-"""What kill -9 costs: a worker, the service, or everything of it, at random moments during uploads and identifications.
+"""What kill -9 costs: a worker, the service, everything of it, or PostgreSQL, at random moments during uploads and identifications.
 
-``python -m benchmarks durability [--moments 20] [--cuts 80] [--database sqlite|postgresql] [--seed 1]``
+``python -m benchmarks durability [--moments 20] [--cuts 80 | --short] [--database sqlite|postgresql] [--target TARGET] [--seed 1]``
 
-A client uploads a campaign and has its machine identified, again and again, and tries again whatever was not answered. Somebody else
-kills processes meanwhile, and starts the service again where it was hit. At the end every upload that was answered is compared with what
-was sent, every job that was accepted has to be done, and every result has to be that of a run that nobody disturbed, byte for byte.
+A client uploads a campaign and has its machine identified, again and again, and tries again whatever was not answered or answered 503.
+Somebody else kills processes meanwhile, and starts the service or the database again where they were hit. At the end every upload that
+was answered is compared with what was sent, every job that was accepted has to be done, and every result has to be that of a run that
+nobody disturbed, byte for byte.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import threading
 import time
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,10 +34,15 @@ import httpx2
 from api.client import Client, ServiceError
 from api.schemas.jobs import JobAnswer
 from api.stores.sql import open_store
+from benchmarks.service import others
+from tests.api import identifying
+from tests.fixtures.postgres import Server, new_database, server
 
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLES = ROOT / "data" / "sample_runs"
-TARGETS = ("worker", "service", "everything")
+TARGETS = ("worker", "service", "everything", "database")
+#: For which a killed database stays away [s].
+AWAY = 3.0
 T = TypeVar("T")
 
 
@@ -46,9 +52,12 @@ class Service:
 
     data: Path
     log: Path
-    url: str = ""
+    database: Server | None = None
     port: int = 0
     process: subprocess.Popen[bytes] | None = None
+
+    def __post_init__(self) -> None:
+        self.url = new_database(self.database.url) if self.database else ""
 
     def start(self) -> None:
         """Start it, and return when it answers."""
@@ -83,14 +92,20 @@ class Service:
             _kill([int(row.process.split(":")[0]) for row in store.jobs.workers()])
             store.close()
             return
-        _kill([self.process.pid, *(_descendants(self.process.pid) if target == "everything" else [])])
+        if target == "database":
+            assert self.database is not None
+            self.database.kill()
+            time.sleep(AWAY)
+            self.database.start()
+            return
+        _kill([self.process.pid, *(others(self.process.pid) if target == "everything" else [])])
         self.process.wait()
         self.start()
 
     def stop(self) -> None:
         """End it."""
         assert self.process is not None
-        _kill([self.process.pid, *_descendants(self.process.pid)])
+        _kill([self.process.pid, *others(self.process.pid)])
         self.process.wait()
 
 
@@ -100,21 +115,12 @@ def _kill(pids: list[int]) -> None:
             os.kill(pid, signal.SIGKILL)
 
 
-def _descendants(pid: int) -> list[int]:
-    found = []
-    for each in Path("/proc").iterdir():
-        with suppress(OSError, ValueError):
-            if int((each / "stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[1]) == pid:
-                found += [int(each.name), *_descendants(int(each.name))]
-    return found
-
-
 @dataclass
 class Shop:
     """A client that does not give up, and what it was promised."""
 
     service: Service
-    cuts: int
+    keys: dict[str, Any]
     uploads: dict[tuple[str, str], str] = field(default_factory=dict)
     jobs: list[str] = field(default_factory=list)
     again: Counter[str] = field(default_factory=Counter)
@@ -141,12 +147,12 @@ class Shop:
         """Upload a campaign, and again until it is enough; then have the machine identified from the last one, and wait for the end."""
         self.phase, start = "upload", time.monotonic()
         machine = self.insist("machine", lambda c: c.make_machine(f"M{number}", repeat=f"machine-{number}")).id
-        keys, passes = declared(self.cuts), 0
+        passes = 0
         while passes == 0 or not self.enough.is_set():
             name = f"campaign-{number}-{passes}"
-            campaign = self.insist("campaign", lambda c, name=name: c.make_campaign(machine, keys, repeat=name)).id
+            campaign = self.insist("campaign", lambda c, name=name: c.make_campaign(machine, self.keys, repeat=name)).id
             passes += 1
-            for cut in keys["cuts"]:
+            for cut in self.keys["cuts"]:
                 for kind in ("air", "cut"):
                     file = SAMPLES / cut[kind]
                     answer = self.insist("upload", lambda c, campaign=campaign, file=file: c.upload(campaign, file))
@@ -185,20 +191,20 @@ def declared(cuts: int) -> dict[str, Any]:
     return data | {"cuts": chosen, "toolings": toolings}
 
 
-def study(url: str, moments: int, cuts: int, seed: int) -> dict[str, Any]:
-    """Return what so many kills have cost, on a database or, without a URL, on the embedded store."""
+def study(database: Server | None, moments: int, keys: dict[str, Any], seed: int, targets: Sequence[str]) -> dict[str, Any]:
+    """Return what so many kills have cost, on a database or, without one, on the embedded store."""
     rng = random.Random(seed)
     with tempfile.TemporaryDirectory(prefix="rcsa-durability-") as folder:
-        service = Service(Path(folder) / "data", Path(folder) / "log", url)
+        service = Service(Path(folder) / "data", Path(folder) / "log", database)
         service.start()
         try:
-            calm = Shop(service, cuts)
+            calm = Shop(service, keys)
             start = time.monotonic()
             calm.enough.set()
             calm.round(0)
             (first,) = calm.jobs
             expected = calm.insist("result", lambda c: c.result(first))
-            shop = Shop(service, cuts)
+            shop = Shop(service, keys)
             over, failure = threading.Event(), []
 
             def work() -> None:
@@ -216,7 +222,8 @@ def study(url: str, moments: int, cuts: int, seed: int) -> dict[str, Any]:
             while sum(hits.values()) < moments and thread.is_alive():
                 # moments lie apart so that what is at work comes a little further in the mean
                 time.sleep(rng.uniform(0.02, 0.5) * calm.seconds[shop.phase])
-                target = rng.choice(TARGETS[shop.phase == "upload" :])
+                # during an upload no worker is at work
+                target = rng.choice([each for each in targets if each != "worker" or shop.phase != "upload"] or targets)
                 hits[f"{target}, {shop.phase}"] += 1
                 service.hit(target)
                 if 2 * sum(hits.values()) >= moments:
@@ -229,7 +236,7 @@ def study(url: str, moments: int, cuts: int, seed: int) -> dict[str, Any]:
             states = Counter(shop.state(job).state for job in shop.jobs)
             same = sum(shop.insist("result", lambda c, job=job: c.result(job)) == expected for job in shop.jobs)
             return {
-                "database": "PostgreSQL" if url else "SQLite",
+                "database": "PostgreSQL" if database else "SQLite",
                 "kills": dict(sorted(hits.items())),
                 "uploads answered": len(shop.uploads),
                 "uploads lost": shop.lost(),
@@ -245,14 +252,12 @@ def study(url: str, moments: int, cuts: int, seed: int) -> dict[str, Any]:
 
 
 @contextmanager
-def _database(kind: str) -> Iterator[str]:
+def _database(kind: str) -> Iterator[Server | None]:
     if kind == "sqlite":
-        yield ""
+        yield None
         return
-    from tests.fixtures.postgres import new_database, server
-
-    with server(safe=True) as url:
-        yield new_database(url)
+    with server(safe=True) as running:
+        yield running
 
 
 def main(arguments: list[str]) -> None:
@@ -262,13 +267,16 @@ def main(arguments: list[str]) -> None:
     )
     parser.add_argument("--moments", type=int, default=20)
     parser.add_argument("--cuts", type=int, default=80)
+    parser.add_argument("--short", action="store_true", help="a campaign of four cuts along one axis, which is soon identified")
     parser.add_argument("--database", choices=("sqlite", "postgresql"), action="append")
+    parser.add_argument("--target", choices=TARGETS, action="append", help="what is killed, by default each; a file has no server to kill")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args(arguments)
-    bad = False
+    keys, bad = identifying.declared() if given.short else declared(given.cuts), False
     for kind in given.database or ("sqlite", "postgresql"):
-        with _database(kind) as url:
-            found = study(url, given.moments, given.cuts, given.seed)
+        with _database(kind) as database:
+            targets = [each for each in given.target or TARGETS if each != "database" or database]
+            found = study(database, given.moments, keys, given.seed, targets)
         for name, value in found.items():
             print(f"{name:<38} {value}", flush=True)
         bad |= bool(found["uploads lost"] or found["jobs lost"]) or found["results equal to the undisturbed run"] != found["jobs accepted"]

@@ -218,7 +218,7 @@ def learnts(folder: Path) -> bytes:
 
 
 def robot_results(folder: Path) -> str:
-    from rcsa_ident.identification.arm.parameters import PosedLayout
+    from rcsa_ident.identification.arm.unknowns import PosedLayout
     from rcsa_ident.io.results.parts import plain
     from rcsa_ident.io.settings.robots import read_robot, robot_keys
 

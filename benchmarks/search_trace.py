@@ -33,9 +33,10 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import NoiseWeightedCost, PaperGeneticAlgorithm
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import Layout, flange_layout, flange_modes, joint_of, split, unpack
+from rcsa_ident.identification.modal_parameters import flange_modes
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.search import starts
+from rcsa_ident.identification.unknowns import Layout, flange_layout, joint_of, split, unpack
 
 CONDITION, AXIS = "no-trigger", Dof.X
 #: Delays tried over a tooth-passing period in each evaluation; the default's own exploration tries as many.

@@ -84,7 +84,7 @@ def use(process: int) -> tuple[float, float]:
     """Return the seconds of a core that a process and its descendants have taken, and their memory [MB]; zeros where nobody tells."""
     mine = {process} | others(process)
     ticks = sum(int(field) for id in mine for field in (_stat(id) or ["0"] * 13)[11:13])
-    return ticks / os.sysconf("SC_CLK_TCK"), sum(_memory(id) for id in mine)
+    return ticks / os.sysconf("SC_CLK_TCK"), sum(memory(id) for id in mine)
 
 
 def others(process: int) -> set[int]:
@@ -108,7 +108,7 @@ def _stat(process: int) -> list[str]:
         return []
 
 
-def _memory(process: int) -> float:
+def memory(process: int) -> float:
     """What a process has in memory; of pages that several share, its part [MB]."""
     try:
         lines = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="utf-8").splitlines()
@@ -140,8 +140,9 @@ def _segment(length: float, diameter: float, material: str) -> dict[str, Any]:
 def machine_text() -> str:
     """Return RESULT.json of two axes, seven modes each, with the posterior of 56 unknowns and a rival that an identification has."""
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.identification.parameters import AxisLayout, pack, parameter_names, simple_axis
+    from rcsa_ident.identification.modal_parameters import flange_of
     from rcsa_ident.identification.posterior import Posterior
+    from rcsa_ident.identification.unknowns import ModalBlock, pack, parameter_names
     from rcsa_ident.io.results.parts import plain, spindle_to_json
 
     natural = 2.0 * np.pi * np.array([620.0, 998.0, 1285.0, 1820.0, 2330.0, 3100.0, 3970.0])
@@ -149,11 +150,11 @@ def machine_text() -> str:
     joint = np.log([3e9, 6e6, 2e3, 10.0])
     axes = {}
     for name, axis, shift in (("X", Dof.X, 1.0), ("Y", Dof.Y, 0.97)):
-        layout = AxisLayout(7)
+        layout = ModalBlock(7)
         damping = np.diag(np.sqrt(0.1 * shift * natural))
-        theta = np.concatenate([pack(simple_axis(shift * natural, psi, damping, np.diag([2e-5, 2e-5])), layout), joint])
-        few = AxisLayout(6)
-        rival = np.concatenate([pack(simple_axis(shift * natural[:6], psi[:6], damping[:6, :6], np.diag([3e-5, 3e-5])), few), joint])
+        theta = np.concatenate([pack(flange_of(shift * natural, psi, damping, np.diag([2e-5, 2e-5])), layout), joint])
+        few = ModalBlock(6)
+        rival = np.concatenate([pack(flange_of(shift * natural[:6], psi[:6], damping[:6, :6], np.diag([3e-5, 3e-5])), few), joint])
         rng = np.random.default_rng(1)
         half = 0.003 * rng.standard_normal((theta.size, theta.size)) / np.sqrt(theta.size)
         covariance = half @ half.T

@@ -23,7 +23,7 @@ class Jobs(Asking):
     """Requests about jobs."""
 
     def identify_campaign(self, campaign: str, repeat: str | None = None, **further: Any) -> JobAnswer:
-        """Submit the identification of a machine from a campaign; options seed, method, start, apply. `repeat` is an idempotency key."""
+        """Submit the identification of a campaign; options seed, method, start, apply, robot. `repeat` is an idempotency key."""
         headers = {} if repeat is None else {"Idempotency-Key": repeat}
         return read(JobAnswer, self.send("POST", "/identifications", json={"campaign": campaign, **further}, headers=headers))
 

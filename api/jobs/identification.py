@@ -20,6 +20,7 @@ from api.stores.jobs import Applied, Job, Outcome
 from api.work import tasks
 from api.work.machine_cache import starts
 from api.work.requests import anonymous
+from api.work.robots import parsed, robot_from
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.scaleout import Map
 from rcsa_ident.base.units import to_hz
@@ -33,10 +34,13 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.task import Task
 from rcsa_ident.io.results.identifications import identification_to_json
 from rcsa_ident.io.results.parts import check_result, layout, plain
+from rcsa_ident.io.results.robot_results import robot_result_to_json
+from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.setup.campaign import Campaign, HammerTest
 from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import Reading, among_fellows
 from rcsa_ident.workflows.identify import ReadCut, ReadTest, data_of, hammer_lines, judge_cut, left_out, mode_deviations, of_campaign
+from rcsa_ident.workflows.identify_robot import identify_robot
 
 log = logging.getLogger("rcsa_ident.jobs")
 #: Returns a campaign of a group, what reads its cuts and what reads its hammer tests.
@@ -54,7 +58,8 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     ----------
     load : callable
     job : Job
-        With campaign, seed, method and apply in its request; the identification that it goes on from is its text ``start``.
+        With campaign, seed, method and apply in its request; the identification that it goes on from is its text ``start``, a robot's
+        data sheet its text ``robot``.
     spread : callable
         A map that the searches may go through, in place of the builtin.
 
@@ -64,11 +69,13 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
         The campaign is gone or has changed, or none of its cuts is usable and there is no hammer test.
     """
     request = json.loads(whole(job.request, job.request_digest, f"request of the job {job.id}", "ask for the job once more"))
-    start = context.jobs.text(job.id, "start")
+    start, robot = (context.jobs.text(job.id, name) for name in ("start", "robot"))
     campaign, read, read_test = load(job.group, str(job.campaign))
     plan = context.remember("plan", lambda: [_files(each) for each in _parts(campaign)])
     campaign = _planned(campaign, plan)
     readings = _readings(campaign, read, context)
+    if robot is not None:
+        return _of_robot(robot, campaign, readings, request["seed"], context, spread)
     data = data_of(campaign, readings, hammer_lines(campaign, partial(anonymous, read_test)))
     story = _Story(context, Preview(data), datetime.fromisoformat(str(job.started)))
     found = _method(request["method"], start).run(data, request["seed"], _Remembering(context, spread), story)
@@ -90,6 +97,19 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
         problem = problem or json.dumps({"detail": NO_REPORT, "errors": []})
     context.progress("result", 1, 1)
     return Outcome("done", "", status=str(found.status), texts=texts, applied=applied, problem=problem)
+
+
+def _of_robot(robot: str, campaign: Campaign, readings: list[Reading], seed: int, context: JobContext, spread: Map) -> Outcome:
+    """A robot's springs, dampers and spindle, in the file that takes ROBOT.toml's place."""
+
+    def told(stage: object, cost: float, solution: object) -> None:
+        del solution
+        context.event("trace", {"axis": BOTH, "stage": str(stage), "cost": cost, "seconds": round(time.monotonic() - begun, 3)})
+
+    begun = time.monotonic()
+    found = identify_robot(campaign, readings, FlexibleRobot(robot_from(parsed(robot))), seed, _Remembering(context, spread), told)
+    content = robot_result_to_json(found, campaign.name, left_out(readings))
+    return Outcome("done", "", status=str(found.status), texts={"result": layout(plain(content)) + "\n"})
 
 
 def _parts(campaign: Campaign) -> list[Cut | HammerTest]:

@@ -12,10 +12,10 @@ from api.components import ThisService
 from api.conventions import BODY, After, Limit, Repeat, guard, page, problems
 from api.live import jobs
 from api.live.jobs import ACCEPTED, RETRY, STREAM, JobId, Prefer, Seen
-from api.lookups import known_campaign
+from api.lookups import known_campaign, robot_text
 from api.schemas.common import ID_PATTERN, Page
 from api.schemas.jobs import FittedLines, JobAnswer, JobState, NewIdentification
-from api.schemas.machines import Identification, Modes
+from api.schemas.machines import Identification, IdentifiedRobot, Modes
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.jobs import Job
 from api.work import tasks
@@ -32,7 +32,7 @@ _Of = Annotated[str | None, Query(pattern=ID_PATTERN)]
 @router.post(
     "",
     status_code=202,
-    summary="Identify a machine from a campaign",
+    summary="Identify a machine, or a robot, from a campaign",
     description="The identification is a job; it uses the recordings that have been uploaded when it starts.",
     openapi_extra=guard("run"),
     response_model=JobAnswer,
@@ -46,6 +46,12 @@ def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, 
     if counts.hammer and body.method == "paper":
         raise InputError("method", "paper with hammer tests", "the default method, which takes them")
     texts = {}
+    if body.robot is not None:
+        if body.method != "default" or body.start:
+            raise InputError("robot", "one with another method or a start", "the default method alone, which begins at the data sheet")
+        if counts.hammer:
+            raise InputError("robot", "one with hammer tests", "a campaign of cuts alone")
+        texts["robot"] = robot_text(components, caller.group, body.robot)
     if body.start:
         if body.method == "paper":
             raise InputError("start", "true with the method paper", "the default method, which has a posterior")
@@ -122,7 +128,10 @@ def frf(id: JobId, components: ThisService, caller: WhoAsks) -> FittedLines:
     summary="RESULT.json",
     openapi_extra=guard("read"),
     response_class=Response,
-    responses={200: {"model": Identification, "description": "For use with the commands, too."}, **problems(404, 409, 422)},
+    responses={
+        200: {"model": Identification | IdentifiedRobot, "description": "For use with the commands, too."},
+        **problems(404, 409, 422),
+    },
 )
 def result(id: JobId, components: ThisService, caller: WhoAsks) -> Response:
     return Response(jobs.finished(components, caller.group, id, KIND, "result").encode(), media_type="application/json")

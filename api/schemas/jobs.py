@@ -6,14 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from api.schemas.common import Answer, Body, Fault, Id
+from api.schemas.common import Answer, Body, Fault, Id, Name
 from api.schemas.queries import LobeAnswer
 
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 
 class NewIdentification(Body):
-    """Identification of a machine from a campaign."""
+    """Identification of a machine, or of a robot, from a campaign."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"campaign": "c1", "seed": 1, "method": "default"}]})
 
@@ -23,7 +23,10 @@ class NewIdentification(Body):
         "default"
     )
     start: bool = Field(False, description="Start from the machine's current identification; with the default method only.")
-    apply: bool = Field(True, description="Make it the machine's current identification, unless it failed.")
+    apply: bool = Field(True, description="Make it the machine's current identification, unless it failed; of a robot nothing is.")
+    robot: Name | None = Field(
+        None, description="A robot, kept or published, that made the cuts, each at its posture_deg: its springs and spindle are found."
+    )
 
 
 class Progress(Answer):

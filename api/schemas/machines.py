@@ -86,6 +86,23 @@ class Identification(Answer):
     )
 
 
+class IdentifiedRobot(Answer):
+    """RESULT.json of `rcsa-ident robot identify`; further keys are kept."""
+
+    model_config = ConfigDict(extra="allow")
+
+    schema_version: int
+    kind: Literal["identified robot"]
+    status: str
+    reasons: list[str]
+    seed: int
+    software: str
+    campaign: dict[str, Any]
+    band_hz: list[float]
+    springs: list[dict[str, Any]]
+    robot: dict[str, Any]
+
+
 class WholeMode(Answer):
     """A mode of a machine whose X and Y feel each other, its spindle at standstill."""
 

@@ -85,6 +85,8 @@ def modes(text: str) -> dict[str, Any]:
     if not is_result(text):
         raise InputError("machine", "a measured flange, which has no modes", "a machine with an identification")
     data = json.loads(text)
+    if "kind" in data:
+        raise InputError("identification", "one of a robot, whose springs and modes stand in its result", "one of a machine")
     axes = {}
     for name, axis in data["axes"].items():
         rows = [{key: mode.get(key) for key in _MODE} for mode in axis["modes"]]

@@ -31,9 +31,9 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.identification.parameters import AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.identification.unknowns import ModalBlock
 from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.inertia import accelerations
@@ -158,7 +158,7 @@ def _lobes() -> None:
 
 def _tips() -> None:
     """The tip of a tooling on a machine with a posterior, as every tool change asks for it."""
-    layout = AxisLayout(2)
+    layout = ModalBlock(2)
     theta = np.concatenate([np.log([5000.0, 9000.0]), np.full(layout.size - 2, 0.1), np.log([2e9, 5e6, 1e4, 10.0])])
     posterior = Posterior(theta, 1e-6 * np.eye(theta.size), layout)
     axis = MachineAxis(Spindle(posterior.machine(Dof.X)[0]), posterior.machine(Dof.X)[1], posterior)

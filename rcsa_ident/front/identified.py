@@ -7,22 +7,80 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
-from rcsa_ident.base.shown import Drawn
+from rcsa_ident.base.shown import Drawn, Saved
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.arm.posterior import RobotPosterior
+from rcsa_ident.identification.arm.result import RobotIdentification
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.result import Identification, in_words
 from rcsa_ident.identification.status import Status
 from rcsa_ident.io.results.drawings import learned_of
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
+from rcsa_ident.io.results.robot_results import robot_result_to_json
 from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.learnt import LearnedValue
 from rcsa_ident.workflows.identify import left_out, mode_deviations
 
 
+class _Told:
+    """What every answer says of itself, as its file holds it."""
+
+    __slots__ = ()
+    data: Mapping[str, Any]
+
+    @property
+    def status(self) -> Status:
+        """May the answer be used?"""
+        return Status(self.data["status"])
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it is not simply converged."""
+        return tuple(self.data["reasons"])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the data cannot tell, and what was done about single cuts."""
+        return tuple(self.data.get("notes", ()))
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Cuts that were not used, each with the reason."""
+        return {cut["id"]: cut["reason"] for cut in self.data["campaign"]["cuts_left_out"]}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Drawn):
+class RobotResult(_Told, Saved):
+    """An identification of a robot, as its RESULT.json holds it; `read_robot_result` reads the file back.
+
+    Parameters
+    ----------
+    data : mapping
+        The file's content.
+    identification : RobotIdentification
+    """
+
+    data: Mapping[str, Any]
+    identification: RobotIdentification
+
+    @classmethod
+    def of(cls, found: RobotIdentification, campaign: Campaign, readings: Sequence[Reading]) -> Self:
+        """Return the result of an identification."""
+        return cls(robot_result_to_json(found, campaign.name, left_out(readings)), found)
+
+    @property
+    def posterior(self) -> RobotPosterior:
+        """The robot that was found: `posterior.at(posture)` is a machine that takes any tooling."""
+        return self.identification.posterior
+
+    def __str__(self) -> str:
+        return str(self.identification)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(_Told, Drawn):
     """An identification, as RESULT.json holds it.
 
     Parameters
@@ -61,26 +119,6 @@ class Result(Drawn):
         """Return the result of an identification."""
         data = identification_to_json(found, campaign, left_out(readings), mode_deviations(found))
         return cls(data, identification=found, campaign=campaign, readings=tuple(readings))
-
-    @property
-    def status(self) -> Status:
-        """May the answer be used?"""
-        return Status(self.data["status"])
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """Why it is not simply converged."""
-        return tuple(self.data["reasons"])
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What the data cannot tell, and what was done about single cuts."""
-        return tuple(self.data.get("notes", ()))
-
-    @property
-    def left_out(self) -> dict[str, str]:
-        """Cuts that were not used, each with the reason."""
-        return {cut["id"]: cut["reason"] for cut in self.data["campaign"]["cuts_left_out"]}
 
     @property
     def learned(self) -> tuple[LearnedValue, ...]:

@@ -21,7 +21,7 @@ from rcsa_ident.base.units import from_hz, to_cm3_per_min, to_rpm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.front.identified import Result
+from rcsa_ident.front.identified import Result, RobotResult
 from rcsa_ident.io.curves.exports import write_tap
 from rcsa_ident.io.curves.flanges import write_flange_machine
 from rcsa_ident.io.curves.forces import write_forces
@@ -29,7 +29,7 @@ from rcsa_ident.io.curves.lobes import write_advice, write_lobes, write_map
 from rcsa_ident.io.curves.tips import write_tip_csv
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.recordings.readers import write_recording
-from rcsa_ident.io.results.parts import write_result
+from rcsa_ident.io.results.parts import layout, plain, write_result
 from rcsa_ident.io.settings.modes import write_modes
 from rcsa_ident.io.settings.toolings import write_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine
@@ -211,6 +211,11 @@ def _(result: Result) -> dict[str, Writer]:
     if result.identification is not None and result.campaign is not None:
         found[".html"] = partial(_report, result)
     return found
+
+
+@formats.register
+def _(result: RobotResult) -> dict[str, Writer]:
+    return {".json": lambda path: write_text(path, layout(plain(result.data)) + "\n")}
 
 
 def _report(result: Result, path: Path) -> None:

@@ -26,10 +26,11 @@ if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.cutting.power import SpindleDrive
     from rcsa_ident.dynamics.receptance import Receptance
-    from rcsa_ident.front.identified import Result
+    from rcsa_ident.front.identified import Result, RobotResult
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.identification.method import Method
     from rcsa_ident.machine.machine import Machine, TipSource
+    from rcsa_ident.machine.robot.model import RobotModel
     from rcsa_ident.observer.tuning import ObserverMethod
     from rcsa_ident.signals.recording import Recording
     from rcsa_ident.stability.advice import Advice
@@ -74,7 +75,8 @@ def identify(
     start: Result | IdentifiedMachine | None = None,
     processes: int | None = None,
     progress: bool | None = None,
-) -> Result:
+    robot: RobotModel | str | Path | None = None,
+) -> Result | RobotResult:
     """Read and judge all recordings of a campaign, its hammer tests, too, and find modes and joint of the machine that made it.
 
     Parameters
@@ -91,11 +93,18 @@ def identify(
         is computed in this process alone, with a `RuntimeWarning`.
     progress : bool or None
         Whether a line tells how far it is; by default where somebody looks on, in a terminal or a notebook.
+    robot : RobotModel or path of ROBOT.toml, optional
+        The arm that made the cuts, each at its `posture_deg`: its springs, dampers and the spindle in its hand are found then.
+
+    Returns
+    -------
+    Result or RobotResult
+        Of a machine, or of a robot.
 
     Raises
     ------
     InputError
-        If no cut is usable.
+        If no cut is usable; of a robot, if a method or a start is asked for.
 
     Examples
     --------
@@ -109,32 +118,42 @@ def identify(
     """
     from functools import partial
 
-    from rcsa_ident.front.identified import Result
+    from rcsa_ident.front.identified import Result, RobotResult
     from rcsa_ident.front.processes import workers
     from rcsa_ident.io.curves.hammer import read_hammer_test
     from rcsa_ident.io.recordings.readers import read_cut
+    from rcsa_ident.io.settings.robots import read_robot
     from rcsa_ident.io.settings.setups import read_campaign
+    from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.workflows import identify as workflow
+    from rcsa_ident.workflows.identify_robot import identify_robot
 
-    chosen = _method(method, start)
+    chosen, arm = _method(method, start, robot is not None), read_robot(robot) if isinstance(robot, str | Path) else robot
     campaign = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     with _one_thread(), workers(processes) as pool, _line(progress) as line:
         read = partial(read_cut, campaign.sensors, campaign.sampling_rate)
         readings = workflow.judge(campaign, read, pool.map_many, line.counted("recording"))
-        tests = workflow.hammer_lines(campaign, read_hammer_test)
-        line("searching modes")
-        with pool.listening(line.tell) as told:
-            found = workflow.identify(campaign, readings, chosen, seed, pool.map, None if line.stream is None else told, tests)
-        result = Result.of(found, campaign, readings)
+        result: Result | RobotResult
+        if arm is not None:
+            line("searching springs")
+            result = RobotResult.of(identify_robot(campaign, readings, FlexibleRobot(arm), seed, pool.map), campaign, readings)
+        else:
+            tests = workflow.hammer_lines(campaign, read_hammer_test)
+            line("searching modes")
+            with pool.listening(line.tell) as told:
+                found = workflow.identify(campaign, readings, chosen, seed, pool.map, None if line.stream is None else told, tests)
+            result = Result.of(found, campaign, readings)
         line.last = str(result)
     return result
 
 
-def _method(method: Method | str, start: Result | IdentifiedMachine | None) -> Method:
+def _method(method: Method | str, start: Result | IdentifiedMachine | None, of_robot: bool = False) -> Method:
     from rcsa_ident.identification.evidence import EvidenceSelection
     from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
     from rcsa_ident.identification.machine import IdentifiedMachine
 
+    if of_robot and (method != "default" or start is not None):
+        raise InputError("robot", "one with another method or a start", "the default method alone, which begins at the data sheet")
     if method not in METHODS and isinstance(method, str):
         raise InputError("method", method, f"one of {', '.join(METHODS)}, or a method with its settings")
     if start is not None:

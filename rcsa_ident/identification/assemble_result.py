@@ -16,7 +16,6 @@ from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.causes import Causes, causes
 from rcsa_ident.identification.coupled.data import CoupledData
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.identification.coupled.score import Coupling
 from rcsa_ident.identification.data import LEVER, IdentificationData
@@ -25,10 +24,10 @@ from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import evidence
-from rcsa_ident.identification.parameters import Layout, parameter_names, planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, MetTest, Standstill
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.unknowns import CoupledLayout, Layout, parameter_names, planes, unpack
 from rcsa_ident.identification.validation import Prediction, judged, predictions, validated, widening
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.tool_holder.drawings import KnownToolings
@@ -198,7 +197,7 @@ class Fit(ABC):
         if not self.data.stands_still:
             return None
         layout = planes(self.solution.layout)
-        places = layout.axis(i).start + np.arange(layout.axes[i].size)[layout.axes[i].still]
+        places = layout.axis(i).start + np.arange(layout.axes[i].size)[layout.axes[i].parts["standstill"]]
         if not places.size:
             return None
         values, deviations = self.solution.theta[places].tolist(), np.sqrt(np.diag(self.covariance)[places]).tolist()
@@ -370,7 +369,7 @@ class CoupledFit(Fit):
 
     def _posterior(self, whole: FloatArray) -> CoupledPosterior:
         layout = _coupled(self.solution)
-        entries = np.r_[layout.machine, layout.joint]
+        entries = np.r_[layout.block.machine, layout.joint]
         return CoupledPosterior(_unknowns(self.solution), whole[np.ix_(entries, entries)], self.data.speed_range, (_unknowns(self.rival),))
 
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
@@ -392,7 +391,7 @@ class CoupledFit(Fit):
 
     def _turned(self) -> float:
         """By how much the mode that is turned most is turned out of X and Y [rad]."""
-        squares = unpack(self.solution.theta, _coupled(self.solution)).psi ** 2
+        squares = unpack(self.solution.theta, _coupled(self.solution).block).psi ** 2
         x, y = squares[:, :2].sum(axis=1), squares[:, 2:].sum(axis=1)
         return float(np.arctan(np.sqrt(np.max(np.minimum(x, y) / np.maximum(np.maximum(x, y), 1e-300)))))
 
@@ -443,4 +442,4 @@ def _coupled(solution: Solution) -> CoupledLayout:
 
 def _unknowns(solution: Solution) -> CoupledUnknowns:
     layout = _coupled(solution)
-    return CoupledUnknowns(solution.theta[np.r_[layout.machine, layout.joint]], layout.flange)
+    return CoupledUnknowns(solution.theta[np.r_[layout.block.machine, layout.joint]], layout.flange)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.identification.parameters import Unknowns
+from rcsa_ident.identification.unknowns import Unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)

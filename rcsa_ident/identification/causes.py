@@ -25,7 +25,7 @@ from rcsa_ident.identification.linearisation import Linearisation, Residual
 from rcsa_ident.identification.made_cuts import USUAL_PAUSE
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import cut_weights, evidence, model_error
-from rcsa_ident.identification.parameters import JOINT, planes
+from rcsa_ident.identification.unknowns import JOINT, planes
 
 #: Steps of a polish with further unknowns, and how often the noise is learned anew.
 _STEPS, _NOISES = 60, 3

@@ -17,10 +17,10 @@ from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING, FEWEST_TOOLINGS, Status
+from rcsa_ident.identification.unknowns import planes
 from rcsa_ident.identification.validation import Prediction
 from rcsa_ident.machine.flange_part import JointedFlange
 

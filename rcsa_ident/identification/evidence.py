@@ -41,7 +41,6 @@ from rcsa_ident.identification.model_order import (
     exchange_modes,
     model_error,
 )
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, planes, unpack
 from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
@@ -49,6 +48,7 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.search import SearchSettings, explore
 from rcsa_ident.identification.sweep_correction import unswept
 from rcsa_ident.identification.task import Phase, finite, perform
+from rcsa_ident.identification.unknowns import JOINT, Layout, ModalBlock, pack, planes, unpack
 
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
@@ -368,7 +368,7 @@ class SearchAxis:
         report(Stage.NOISE, best.cost, best)
         return axis_search(best, misfit, trace)
 
-    def _starts(self, band: tuple[float, float], report: Report) -> list[tuple[FloatArray, AxisLayout, FloatArray]]:
+    def _starts(self, band: tuple[float, float], report: Report) -> list[tuple[FloatArray, ModalBlock, FloatArray]]:
         """Unknowns of flange and joint, their layout, and the cuts' delays and angles: explored, or those of the earlier answer."""
         method, data = self.method, self.data
         known = None if method.start is None else method.start.get(data.axes[0].axis)
@@ -377,7 +377,7 @@ class SearchAxis:
             population = explore(Misfit(data, method.priors, (method.coarse[0],)), method.search, band, rng, report)
             return [(s.theta, planes(s.layout).axes[0], s.evaluation.nuisance) for s in population[: method.candidates]]
         # the last polish asks again whether the machine changes with speed
-        machine, layout = unpack(known.theta[:-JOINT], known.layout), AxisLayout(known.layout.modes, data.axes[0].places)
+        machine, layout = unpack(known.theta[:-JOINT], known.layout), ModalBlock(known.layout.modes, data.axes[0].places)
         # a place that the earlier answer does not know moves about as the flange does
         like = replace(machine, places=machine.psi[:, :1], place_residual=np.zeros((1, 2)))
         return [(np.concatenate([pack(like, layout), known.theta[-JOINT:]]), layout, np.zeros((len(data.cut_ids), 2)))]

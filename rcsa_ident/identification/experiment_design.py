@@ -21,8 +21,9 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification._kernels.frf import cross_frf, cross_frf_gradient
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, chain, lower_triangle, residual_turn, scaled_joint, unpack
+from rcsa_ident.identification.modal_parameters import residual_turn
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.unknowns import JOINT, ModalBlock, chain, lower_triangle, scaled_joint, unpack
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, WEAKEST_FORCE, CutMeasurement
 
@@ -359,7 +360,7 @@ def _lines(axis: AxisData, spindle_speed: FloatArray, posterior: Posterior) -> t
 
 
 def _cross(
-    theta: FloatArray, layout: AxisLayout, points: FloatArray, holder: ComplexArray, slopes: bool
+    theta: FloatArray, layout: ModalBlock, points: FloatArray, holder: ComplexArray, slopes: bool
 ) -> tuple[ComplexArray, ComplexArray]:
     """Cross FRF of an axis and a joint, shape (n,), and its change with the vector where asked for, shape (n, p)."""
     if layout.places:
@@ -378,7 +379,7 @@ def _cross(
     return values[:, 0], columns
 
 
-def _tip(theta: FloatArray, layout: AxisLayout, holder: Receptance) -> tuple[ComplexArray, ComplexArray]:
+def _tip(theta: FloatArray, layout: ModalBlock, holder: Receptance) -> tuple[ComplexArray, ComplexArray]:
     """C11 = A11 - a^T x with x = E^-1 a, and dC11 = x^T dE x, E = A22 + B + K^-1; shapes (n,), (n, p)."""
     axis, joint = unpack(theta[:-JOINT], layout), scaled_joint(theta[-JOINT:])
     omega, lever = holder.omega, np.array([1.0, LEVER])

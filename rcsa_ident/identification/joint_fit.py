@@ -16,10 +16,10 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, cut_weights, evidence, exchange_modes, grow_modes, model_error
-from rcsa_ident.identification.parameters import Layout, Unknowns, pack, planes, unpack
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.task import Phase, finite, perform
+from rcsa_ident.identification.unknowns import Layout, Unknowns, pack, planes, unpack
 
 #: Modes per axis beyond what the evidence asks for.
 GROWN = 1

@@ -11,7 +11,7 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.linearisation import DELAY_UNIT
 from rcsa_ident.identification.misfit import Evaluation, Misfit
-from rcsa_ident.identification.parameters import Unknowns
+from rcsa_ident.identification.unknowns import Unknowns
 
 #: No parameter (all are logarithms or of order one) moves further in one step.
 LARGEST_STEP = 1.0

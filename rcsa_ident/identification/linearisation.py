@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels.lines import sum_cuts
-from rcsa_ident.identification.parameters import Unknowns
+from rcsa_ident.identification.unknowns import Unknowns
 
 #: Unit of a delay in the normal equations [s].
 DELAY_UNIT = 1e-6

@@ -14,9 +14,9 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, Unknowns
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Known, Priors
+from rcsa_ident.identification.unknowns import JOINT, Layout, ModalBlock, Unknowns
 from rcsa_ident.tool_holder.drawings import KnownToolings
 
 
@@ -116,7 +116,7 @@ class KnownMachine:
             known = self.posteriors[axis.axis].layout
             # a machine that was found while it turned may be another one at standstill
             still = bool(self.speed_range[0]) and bool(np.any(axis.still))
-            axes.append(AxisLayout(known.modes, softening=known.softening, standstill=still))
+            axes.append(ModalBlock(known.modes, softening=known.softening, standstill=still))
         return Layout(tuple(axes), len(data.coefficient_spread))
 
     def places(self, layout: Layout) -> np.ndarray:
@@ -203,7 +203,7 @@ class KnownMachine:
         force = np.arange(layout.force.start, layout.force.stop)
         found[force, force] = np.square(data.coefficient_spread)
         for i, axis in enumerate(layout.axes):
-            still = layout.axis(i).start + np.arange(axis.size)[axis.still]
+            still = layout.axis(i).start + np.arange(axis.size)[axis.parts["standstill"]]
             found[still, still] = np.square(Priors().standstill)[: still.size]
         entries, unit = self.entries(data, layout.force.start)
         if self.toolings is not None and np.any(entries >= 0):

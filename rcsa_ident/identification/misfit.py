@@ -15,20 +15,10 @@ from rcsa_ident.identification._kernels.lines import fit_cuts, force_rows, mix_c
 from rcsa_ident.identification.data import AxisData, IdentificationData
 from rcsa_ident.identification.linearisation import DELAY_UNIT, Linearisation, Residual
 from rcsa_ident.identification.made_cuts import CutPrior
-from rcsa_ident.identification.parameters import (
-    JOINT,
-    RESIDUAL_UNIT,
-    AxisLayout,
-    AxisParameters,
-    Layout,
-    Unknowns,
-    chain,
-    residual_turn,
-    scaled_joint,
-    unpack,
-)
-from rcsa_ident.identification.priors import Known, Priors, prior_rows
+from rcsa_ident.identification.modal_parameters import ModalParameters, residual_turn
+from rcsa_ident.identification.priors import Known, PriorRows, Priors
 from rcsa_ident.identification.rough_toolings import ToolingAt, placed
+from rcsa_ident.identification.unknowns import JOINT, RESIDUAL_UNIT, Layout, ModalBlock, Unknowns, chain, prior_rows, scaled_joint, unpack
 
 #: Entries of a tool-holder that a line feels: the flange's tt, tr, rr, flange over tip t, r, and where the tip was hit the tip's own.
 HOLDER = 6
@@ -186,10 +176,13 @@ class Misfit:
         """Spindle speed of each cut within those over which the machine changes, from -1 to 1, shape (k,) [-]."""
         return self.data.relative_speed
 
-    def prior(self, layout: Unknowns) -> Known:
-        """Return the priors of a layout's unknowns."""
-        assert isinstance(layout, Layout)
+    def rows(self, layout: Unknowns) -> PriorRows:
+        """Return the priors of a layout's unknowns before any cut of the machine."""
         return prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
+
+    def prior(self, layout: Unknowns) -> Known:
+        """Return what is known of a layout's unknowns beforehand."""
+        return self.rows(layout)
 
     def without_delay(self, i: int, theta: FloatArray, layout: Unknowns, nuisance: FloatArray) -> ComplexArray:
         """Return the measured motion of an axis (see `AxisData.measured`) with tooth 1 at immersion 0 at the start, shape (n,) [m/N]."""
@@ -435,14 +428,14 @@ class _AxisAnswer:
     kept: FloatArray
     factor: ComplexArray
     slope: ComplexArray
-    axis: AxisParameters
-    layout: AxisLayout
+    axis: ModalParameters
+    layout: ModalBlock
     joint: FloatArray
     toolings: Sequence[ToolingAt]
     felt: _Felt
 
     def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
-        axis, bare = self.axis, slice(self.layout.core - 3, self.layout.core)
+        axis, bare = self.axis, self.layout.parts["residual"]
         n, o = self.model.shape
         scale = np.concatenate([chain(axis, self.layout), self.joint[:JOINT]])
         own, forces, holder = scale.size, self.slope.shape[1], HOLDER if self.toolings else 0

@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisParameters, Layout, Unknowns, pack, unpack, with_mode, without_mode
+from rcsa_ident.identification.modal_parameters import ModalParameters
 from rcsa_ident.identification.progress import Stage
+from rcsa_ident.identification.unknowns import DIRECTIONS, Unknowns, pack, unpack
 
 #: Walks down end where the evidence lies this far behind the best seen: nothing below comes back from there. The second one is
 #: for a model that a walk has ended with before.
@@ -30,6 +31,8 @@ NEW_DAMPING = (0.015, 0.06, 0.25)
 PLACES = 30
 #: Modes whose frequencies lie closer than this ratio may be one.
 CLOSE = 1.2
+#: New modes that are tried at a time: of a plane, and where every line feels all of them.
+PROMISING_OF_PLANE, PROMISING = 3, 4
 
 #: Told of a stage, the cost or evidence that it came to, and its solution.
 Report = Callable[[Stage, float, Solution], None]
@@ -52,47 +55,58 @@ def evidence(solution: Solution, misfit: Misfit) -> float:
     return value if sign > 0.0 and np.isfinite(value) else np.inf
 
 
-class Growth(Protocol):
-    """How a model comes to have one mode more."""
+def fewer(solution: Solution, smallest: int) -> list[Trial]:
+    """Return all models with one mode less: each is left out in turn, and close ones are made one.
 
-    def groups(self, layout: Unknowns) -> int:
-        """Return how many sets of modes there are, each with its own lines."""
-        ...
-
-    def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
-        """Return the most promising models with one mode more in set `i`."""
-        ...
-
-
-class ModeSteps(Growth, Protocol):
-    """How a model comes to have one mode less or more."""
-
-    def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
-        """Return all models with one mode less, none of them with less than the smallest number."""
-        ...
-
-
-class _PlaneSteps:
-    """Each axis has its own modes."""
-
-    def groups(self, layout: Unknowns) -> int:
-        return len(layout.modes_of_axes)
-
-    def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
-        trials: list[Trial] = []
-        layout = solution.layout
-        assert isinstance(layout, Layout)
-        for i, part in enumerate(layout.axes):
-            axis = unpack(solution.theta[layout.axis(i)], part)
-            if axis.order > smallest:
-                trials += [_with_axis(solution, i, each) for each in [without_mode(axis, m) for m in range(axis.order)] + merged(axis)]
-        return trials
-
-    def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
-        return [_with_axis(solution, i, axis) for axis in promising(solution, misfit, i, band_hz)]
+    Parameters
+    ----------
+    solution : Solution
+    smallest : int
+        Fewest modes of a plane.
+    """
+    trials = []
+    for k, block in solution.layout.modal:
+        machine = unpack(solution.theta[solution.layout.places[k]], block)
+        if machine.order > smallest * block.directions // 2:
+            left_out = [(machine, mode) for mode in range(machine.order)]
+            left_out += [(merged(machine, low, high), high) for low, high in close_pairs(machine)]
+            trials += [_with_modes(solution, k, each.without_mode(mode), partial(np.delete, obj=mode, axis=2)) for each, mode in left_out]
+    return trials
 
 
-PLANES: ModeSteps = _PlaneSteps()
+def more(solution: Solution, misfit: Misfit, k: int, band_hz: tuple[float, float]) -> list[Trial]:
+    """Return the models with one more mode in front, at the frequencies and along the shapes where the linearised misfit promises most.
+
+    A mode with shape psi adds psi psi^T / (omega_n^2 - omega^2 + 2 i zeta omega_n omega) to the flange's receptance: linear in
+    the entries of psi psi^T, so that all frequencies are judged by one least-squares solution each, the other unknowns and the
+    cuts' delays following.
+
+    Parameters
+    ----------
+    solution : Solution
+        With normal equations.
+    misfit : Misfit
+    k : int
+        Block of modes, of a plane or of a whole machine.
+    band_hz : (float, float) [Hz]
+        Lowest and highest line.
+    """
+    layout, block = solution.layout, dict(solution.layout.modal)[k]
+    axes, count = (range(len(misfit.data.axes)), PROMISING) if block.directions == DIRECTIONS else ((k,), PROMISING_OF_PLANE)
+    machine = unpack(solution.theta[layout.places[k]], block)
+    modes = new_modes(solution, misfit, tuple(axes), band_hz, count)
+    return [
+        _with_modes(solution, k, machine.with_mode(omega_n, shape, zeta), partial(np.pad, pad_width=((0, 0), (0, 0), (1, 0))))
+        for omega_n, zeta, shape in modes
+    ]
+
+
+def _with_modes(solution: Solution, k: int, machine: ModalParameters, discs: Callable[[FloatArray], FloatArray]) -> Trial:
+    """The vector with other modes in block `k`; `discs` makes their gyroscopic coupling's a and b of the old one's."""
+    old, block = solution.layout, dict(solution.layout.modal)[k]
+    place, layout = old.places[k], old.with_modes(k, machine.order)
+    own = pack(machine, dict(layout.modal)[k], discs(block.discs(solution.theta[place])))
+    return np.concatenate([solution.theta[: place.start], own, solution.theta[place.stop :]]), layout
 
 
 def drop_modes(
@@ -101,7 +115,6 @@ def drop_modes(
     report: Report | None = None,
     smallest: int = 2,
     give_up: float = GIVE_UP,
-    steps: ModeSteps = PLANES,
 ) -> Solution:
     """Return the best of the models with ever fewer modes.
 
@@ -118,13 +131,12 @@ def drop_modes(
         Fewest modes of an axis.
     give_up : float
         The walk ends where the evidence lies this far behind the best seen.
-    steps : ModeSteps
     """
     best, best_evidence = solution, evidence(solution, misfit)
     here = solution
     while True:
         nuisance = here.evaluation.nuisance
-        trials = [(misfit.evaluate(theta, layout, nuisance).cost, theta, layout) for theta, layout in steps.fewer(here, smallest)]
+        trials = [(misfit.evaluate(theta, layout, nuisance).cost, theta, layout) for theta, layout in fewer(here, smallest)]
         if not trials:
             break
         trials.sort(key=lambda t: t[0])
@@ -146,7 +158,6 @@ def exchange_modes(
     band_hz: tuple[float, float],
     report: Report | None = None,
     rounds: int = 3,
-    steps: ModeSteps = PLANES,
 ) -> Solution:
     """Return the best model that is reached by adding a mode where it helps most and dropping those that are not needed.
 
@@ -163,15 +174,14 @@ def exchange_modes(
     report : callable of (stage, cost, solution), optional
     rounds : int
         Most rounds.
-    steps : ModeSteps
     """
     best, best_evidence = solution, evidence(solution, misfit)
     for _ in range(rounds):
         trials = []
-        for i in range(steps.groups(best.layout)):
-            for theta, layout in steps.more(best, misfit, i, band_hz):
+        for k, _ in best.layout.modal:
+            for theta, layout in more(best, misfit, k, band_hz):
                 trials.append(refine(misfit, theta, layout, best.evaluation.nuisance, max_steps=6))
-        reached = drop_modes(_polished(trials, misfit, 2), misfit, give_up=GIVE_UP_SOON, steps=steps)
+        reached = drop_modes(_polished(trials, misfit, 2), misfit, give_up=GIVE_UP_SOON)
         value = evidence(reached, misfit)
         if report is not None:
             report(Stage.EXCHANGE, reached.cost, reached)
@@ -181,7 +191,7 @@ def exchange_modes(
     return best
 
 
-def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float], steps: Growth = PLANES) -> Solution:
+def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float]) -> Solution:
     """Return the model with one more mode for each axis, whether or not the evidence asks for it.
 
     A machine has more modes than the data can show. A model that leaves them out is sure of what it cannot know; with them the
@@ -194,40 +204,13 @@ def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float],
     misfit : Misfit
     band_hz : (float, float) [Hz]
         Lowest and highest line.
-    steps : Growth
     """
-    for i in range(steps.groups(solution.layout)):
+    for k, _ in solution.layout.modal:
         trials = []
-        for theta, layout in steps.more(solution, misfit, i, band_hz):
+        for theta, layout in more(solution, misfit, k, band_hz):
             trials.append(refine(misfit, theta, layout, solution.evaluation.nuisance, max_steps=6))
         solution = _polished(trials, misfit, 1)
     return solution
-
-
-def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float], count: int = 3) -> list[AxisParameters]:
-    """Return axis `i` with one more mode, at the frequencies where the linearised misfit promises most.
-
-    A mode with shape psi adds psi psi^T / (omega_n^2 - omega^2 + 2 i zeta omega_n omega) to the flange's receptance: linear in
-    the entries of psi psi^T, so that all frequencies are judged by one least-squares solution each, the other unknowns and the
-    cuts' delays following.
-
-    Parameters
-    ----------
-    solution : Solution
-        With normal equations.
-    misfit : Misfit
-    i : int
-        Number of the axis.
-    band_hz : (float, float) [Hz]
-        Lowest and highest line.
-    count : int
-        Number of frequencies that are tried.
-    """
-    layout = solution.layout
-    assert isinstance(layout, Layout)
-    places = new_modes(solution, misfit, (i,), band_hz, count)
-    axis = unpack(solution.theta[layout.axis(i)], layout.axes[i])
-    return [with_mode(axis, omega_n, (float(shape[0]), float(shape[1])), zeta) for omega_n, zeta, shape in places]
 
 
 def new_modes(
@@ -278,21 +261,22 @@ def new_modes(
     return [(float(frequency[k]), float(damping[k]), shapes[k]) for k in chosen]
 
 
-def merged(axis: AxisParameters) -> list[AxisParameters]:
-    """Return the axis with each two neighbours that stand close made one: together they may do what one mode does."""
-    order = np.argsort(axis.omega_n, kind="stable")
-    found = []
-    for low, high in pairwise(order.tolist()):
-        if axis.omega_n[high] < CLOSE * axis.omega_n[low]:
-            both = axis.psi[[low, high]]
-            psi, omega_n, places = axis.psi.copy(), axis.omega_n.copy(), axis.places.copy()
-            psi[low] = rank_one(np.array([both[:, 0] @ both[:, 0], both[:, 0] @ both[:, 1], both[:, 1] @ both[:, 1]]))
-            # both modes' motion of the other places, and whichever sign the new shape has
-            places[low] = (axis.places[[low, high]].T @ both) @ psi[low] / (psi[low] @ psi[low])
-            share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
-            omega_n[low] = np.exp(share @ np.log(axis.omega_n[[low, high]]))
-            found.append(without_mode(replace(axis, psi=psi, omega_n=omega_n, places=places), high))
-    return found
+def close_pairs(machine: ModalParameters) -> list[tuple[int, int]]:
+    """Return each two modes that are neighbours and stand close, by frequency."""
+    order = np.argsort(machine.omega_n, kind="stable")
+    return [(low, high) for low, high in pairwise(order.tolist()) if machine.omega_n[high] < CLOSE * machine.omega_n[low]]
+
+
+def merged(machine: ModalParameters, low: int, high: int) -> ModalParameters:
+    """Return the machine whose mode `low` does, as well as one can, what `low` and `high` do; `high` is still there."""
+    both = machine.psi[[low, high]]
+    psi, omega_n, places = machine.psi.copy(), machine.omega_n.copy(), machine.places.copy()
+    psi[low] = rank_one(np.array([both[:, i] @ both[:, j] for i, j in zip(*np.triu_indices(both.shape[1]), strict=True)]))
+    # both modes' motion of the other places, and whichever sign the new shape has
+    places[low] = (machine.places[[low, high]].T @ both) @ psi[low] / (psi[low] @ psi[low])
+    share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
+    omega_n[low] = np.exp(share @ np.log(machine.omega_n[[low, high]]))
+    return replace(machine, psi=psi, omega_n=omega_n, places=places)
 
 
 def rank_one(entries: FloatArray) -> FloatArray:
@@ -310,16 +294,6 @@ def _polished(trials: list[Solution], misfit: Misfit, count: int, steps: int = 3
     trials = sorted(trials, key=lambda s: s.cost)[:count]
     near = [trials[0], *(t for t in trials[1:] if t.cost < FAR * trials[0].cost)]
     return min((refine(misfit, t.theta, t.layout, t.evaluation.nuisance, steps) for t in near), key=lambda s: s.cost)
-
-
-def _with_axis(solution: Solution, i: int, axis: AxisParameters) -> Trial:
-    """The vector with another axis in place of axis `i`."""
-    old = solution.layout
-    assert isinstance(old, Layout)
-    axes = tuple(replace(a, modes=axis.order) if k == i else a for k, a in enumerate(old.axes))
-    block = old.axis(i)
-    theta = np.concatenate([solution.theta[: block.start], pack(axis, axes[i]), solution.theta[block.stop :]])
-    return theta, replace(old, axes=axes)
 
 
 def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> tuple[float, ...]:

@@ -12,7 +12,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, flange_modes, joint_of, unpack
+from rcsa_ident.identification.modal_parameters import flange_modes
+from rcsa_ident.identification.unknowns import JOINT, ModalBlock, joint_of, unpack
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, OpenQuestion, Perturbation
 from rcsa_ident.machine.spindle import Spindle
 
@@ -27,12 +28,12 @@ class PlaneUnknowns:
     Parameters
     ----------
     theta : array, shape (p,)
-    layout : AxisLayout
+    layout : ModalBlock
         Without fixture.
     """
 
     theta: FloatArray
-    layout: AxisLayout
+    layout: ModalBlock
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "theta", frozen(self.theta))
@@ -49,7 +50,7 @@ class Posterior:
     theta : array, shape (p,)
         The most probable unknowns.
     covariance : array, shape (p, p)
-    layout : AxisLayout
+    layout : ModalBlock
         Which unknown stands where; without fixture.
     speed_range : (float, float) [rad/s]
         Middle of the campaign's spindle speeds and half their range; only a layout with softening asks for it.
@@ -65,7 +66,7 @@ class Posterior:
 
     theta: FloatArray
     covariance: FloatArray
-    layout: AxisLayout
+    layout: ModalBlock
     speed_range: tuple[float, float] = (0.0, 0.0)
     rivals: tuple[FloatArray, ...] = ()
     tooling_cross: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -102,7 +103,7 @@ class Posterior:
         x = 0.0 if speed is None or half == 0.0 else float(np.clip((speed - middle) / half, -1.0, 1.0))
         return flange_modes(unpack(vector[:-JOINT], layout).at(x), axis), joint_of(vector[-JOINT:])
 
-    def layout_of(self, size: int) -> AxisLayout:
+    def layout_of(self, size: int) -> ModalBlock:
         """Return the layout of a rival whose part without the joint has this size."""
         layouts = (replace(self.layout, modes=m) for m in range(1, 100))
         found = next((layout for layout in layouts if layout.size == size), None)

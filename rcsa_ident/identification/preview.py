@@ -10,11 +10,11 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.data import coupled_data
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.parameters import CoupledLayout
 from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Step
+from rcsa_ident.identification.unknowns import CoupledLayout
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
-from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, Layout, lower_triangle
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +37,8 @@ class Priors:
         Spreads of the shares by which natural frequencies and damping differ while the spindle stands still.
     skew : float [-]
         Spread of an entry of the gyroscopic coupling G: 0.05 splits a pair of modes at 20 000 rev/min by 8 Hz to either side.
+    pull : float [sqrt(kg)]
+        Spread of what the housing's motion pulls a mode of a carried spindle with: a shaft of some kilograms.
     tooth_angle : float [rad]
         Spread of a clamping's unknown tooth angle: wider than a turn, any angle will do.
     """
@@ -54,6 +55,7 @@ class Priors:
     softening: float = 0.03
     standstill: tuple[float, float] = (0.01, 0.2)
     skew: float = 0.05
+    pull: float = 2.0
     tooth_angle: float = 10.0
 
 
@@ -117,48 +119,3 @@ class PriorRows:
         away = theta - self.centre
         away[self.own] -= 0.5 * theta[self.frequency]
         return away / self.spread
-
-
-@lru_cache(maxsize=64)
-def prior_rows(layout: Layout, priors: Priors, coefficients: tuple[float, ...] = ()) -> PriorRows:
-    """Return the priors of a layout's unknowns.
-
-    Parameters
-    ----------
-    layout : Layout
-    priors : Priors
-    coefficients : tuple of float
-        Standard deviations of the logarithms of the cutting coefficients' scales.
-    """
-    centre, spread, own, frequency = [], [], [], []
-    first = 0
-    for axis in layout.axes:
-        m = axis.modes
-        diagonal = lower_triangle(m)[2]
-        parts = [
-            np.full(m, priors.frequency_spread),
-            np.full(2 * m, priors.shape),
-            np.where(diagonal, 0.5 * priors.damping_spread, priors.damping_coupling),
-            np.full(3, priors.residual),
-        ]
-        parts += [np.full(m, priors.shape), np.full(2, priors.residual**2)] * axis.places
-        if axis.standstill:
-            parts.append(np.array(priors.standstill))
-        if axis.softening:
-            parts.append(np.full(axis.pairs, priors.softening))
-        middle = np.zeros(axis.size)
-        middle[:m] = np.log(2.0 * np.pi * priors.frequency_hz)
-        places = 3 * m + np.flatnonzero(diagonal)
-        middle[places] = 0.5 * np.log(2.0 * priors.damping_ratio) - np.log(DAMPING_UNIT)
-        centre.append(middle)
-        spread.append(np.concatenate(parts))
-        own.append(first + places)
-        frequency.append(first + np.arange(m))
-        first += axis.size
-    centre += [np.log(priors.joint), np.zeros(layout.coefficients + layout.clampings)]
-    spread += [np.full(JOINT, priors.joint_spread), np.asarray(coefficients, dtype=float), np.full(layout.clampings, priors.tooth_angle)]
-    middle, width = np.concatenate(centre), np.concatenate(spread)
-    rows, follows = np.concatenate(own), np.concatenate(frequency)
-    jacobian = np.diag(1.0 / width)
-    jacobian[rows, follows] = -0.5 / width[rows]
-    return PriorRows(frozen(middle), frozen(width), frozen(rows, np.intp), frozen(follows, np.intp), frozen(jacobian))

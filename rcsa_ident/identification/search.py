@@ -10,18 +10,8 @@ import numpy as np
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import (
-    DAMPING_UNIT,
-    JOINT,
-    Layout,
-    flange_layout,
-    lower_triangle,
-    pack,
-    selected,
-    split,
-    unpack,
-)
 from rcsa_ident.identification.progress import Stage
+from rcsa_ident.identification.unknowns import DAMPING_UNIT, JOINT, Layout, flange_layout, lower_triangle, pack, split, unpack
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,4 +135,4 @@ def _by_frequency(theta: FloatArray, layout: Layout) -> FloatArray:
     order = np.argsort(part[: axis.modes], kind="stable")
     if np.array_equal(order, np.arange(axis.modes)):
         return theta
-    return np.concatenate([pack(selected(unpack(part, axis), order), axis), joint])
+    return np.concatenate([pack(unpack(part, axis).selected(order), axis), joint])

@@ -16,8 +16,8 @@ import numpy as np
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.data import AxisData, IdentificationData
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import Unknowns, planes
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import Unknowns, planes
 
 #: Weights of a mean over an interval at its middle and, together, at `data.NODE` of its half to both sides: exact to the fifth power.
 _MIDDLE, _SIDES = 8.0 / 18.0, 10.0 / 18.0

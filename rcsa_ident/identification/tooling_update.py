@@ -15,7 +15,7 @@ from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.machine_prior import FurtherMisfit, Gaussian, KnownMachine
 from rcsa_ident.identification.model_order import OUTLYING, cut_weights, evidence, model_error
-from rcsa_ident.identification.parameters import JOINT, Layout, planes
+from rcsa_ident.identification.unknowns import JOINT, Layout, planes
 from rcsa_ident.tool_holder.alteration import ALTERATIONS
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 

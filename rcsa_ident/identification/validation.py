@@ -20,8 +20,8 @@ from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.linearisation import Linearisation
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import Layout
 from rcsa_ident.identification.sweep_correction import unswept
+from rcsa_ident.identification.unknowns import Layout
 
 #: Weight of cuts that take no part: their delays are still fitted.
 _NO_PART = 1e-10

@@ -19,8 +19,8 @@ from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.cutting.stock import engagement_with
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
-from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
+from rcsa_ident.identification.unknowns import JOINT
 from rcsa_ident.report import figures
 from rcsa_ident.report.drawing import tooling_svg
 from rcsa_ident.report.lobes import stability_figure

@@ -347,7 +347,7 @@ CUT = (
     *ENGAGEMENT,
     Field("feed_angle", "feed_direction", DIRECTION, described="+X, -X, +Y, -Y, or an angle from +X in degrees."),
     Field("posture", "posture_deg", Many(Number("deg", _DEGREE)), None,
-          described="Of a robot's joints; an identification here takes cuts at one posture."),
+          described="Of a robot's joints; an identification of the robot asks for it."),
     Field("started", "started", str, None, described="When the recording began, as 2026-11-27T08:15:00."),
     Field("temperature", "temperature_c", Number("°C", 1.0, -40.0, 200.0), None, described="Near the spindle's bearings."),
     Field("validation", "validation", bool, False, described="The cut is predicted, and nothing is learned from it."),

@@ -16,8 +16,8 @@ from rcsa_ident.cutting.force import axial_and_slope
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.identification.arm.data import PosedData, check_postures, posed_data
 from rcsa_ident.identification.arm.fit import fit_robot
-from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.result import RobotCode, RobotIdentification, answer
+from rcsa_ident.identification.arm.unknowns import arm_priors
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.model_order import Report
 from rcsa_ident.identification.rough_data import without_distances
@@ -105,12 +105,12 @@ class _Beside:
         return {name: (rod_poles(each, highest), rod_poles(each, highest, twisting=True)) for name, each in assemblies.items()}
 
     def rods(self, cut: int, omega: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Of `posed.data.Rods`."""
+        """Of `arm.data.Rods`."""
         along, about = (each.receptance(omega).values for each in self._poles[self.data.toolings[self.data.cut_tooling[cut]]])
         return along[:, 1, 1], about[:, 1, 1], along[:, 1, 0]
 
     def axial(self, cut: int, orders: np.ndarray) -> tuple[ComplexArray, ComplexArray]:
-        """Of `posed.data.Axial`."""
+        """Of `arm.data.Axial`."""
         made = self.cuts[self.data.cut_ids[cut]]
         cutter = self.campaign.toolings[made.tooling].cutter
         force, slope = axial_and_slope(cutter, made.conditions, self.campaign.coefficients, orders)

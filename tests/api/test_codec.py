@@ -33,12 +33,11 @@ from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.coupled.fit import CoupledSearch
-from rcsa_ident.identification.coupled.parameters import EVERY_PAIR, CoupledLayout
 from rcsa_ident.identification.joint_fit import AxisSearch
-from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.task import Phase
+from rcsa_ident.identification.unknowns import EVERY_PAIR, CoupledLayout, Layout, ModalBlock
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.stream_forces import LiveObserver
@@ -54,7 +53,7 @@ LEAVES = st.one_of(
     st.complex_numbers(),
     st.text(),
     st.sampled_from(list(Dof)),
-    st.builds(AxisLayout, st.integers(1, 9), st.booleans(), st.booleans()),
+    st.builds(ModalBlock, st.integers(1, 9), st.booleans(), st.booleans()),
     st.builds(Verdict, st.lists(REMARKS, max_size=2).map(tuple), st.just(())),
     ARRAYS,
     ARRAYS.map(lambda a: a.T),
@@ -111,7 +110,7 @@ def test_what_is_told_comes_back(value):
 
 def test_what_a_search_has_come_to():
     rng = np.random.default_rng(1)
-    layout = Layout((AxisLayout(3, places=2), AxisLayout(2, softening=True)), 4, 1)
+    layout = Layout((ModalBlock(3, places=2), ModalBlock(2, softening=True)), 4, 1)
     turned = np.asfortranarray(rng.standard_normal((layout.size, layout.size)))
     candidate = Candidate(rng.standard_normal(layout.size), layout, rng.standard_normal((5, 2)), 1.0 / 3.0, turned)
     steps = [Step("x", Stage.SEARCH, np.inf, 5), Step("both", Stage.MODES, -1.0, 4)]

@@ -1,4 +1,4 @@
-"""kill -9 of a worker, of the service, of everything, in the middle of jobs: nothing accepted is lost, and results stay the same."""
+"""kill -9 of a worker, of the service, of PostgreSQL, of everything, amid jobs: nothing accepted is lost, and results stay the same."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -95,7 +96,7 @@ def expected(tmp_path_factory) -> str:
 
 @pytest.mark.parametrize("kind", [SQLITE, POSTGRESQL])
 def test_an_identification_survives_everything(request, tmp_path, kind, expected):
-    """One job meets the end of its worker, of the service, and of everything at once; each time at some moment of its search."""
+    """One job meets the end of its worker, of its database's server, of the service, and of everything at once, amid its search."""
     rng = random.Random(20261121)
     folder = tmp_path / "data"
     url = f"sqlite:///{folder / 'service.db'}" if kind == SQLITE else database(request, POSTGRESQL, tmp_path)
@@ -108,7 +109,20 @@ def test_an_identification_survives_everything(request, tmp_path, kind, expected
         kill([worker])
         # the service starts another, which goes on
         after(client, job, rng.randrange(1, 4))
-        assert workers(store) != [worker]
+        (second,) = until(partial(workers, store))
+        assert second != worker
+        if kind == POSTGRESQL:
+            server = request.getfixturevalue("postgres_server")
+            (token,) = (row.token for row in store.jobs.workers() if row.process.startswith(f"{second}:"))
+            until(lambda: store.jobs.find(job).worker == token)
+            told = len(store.jobs.events(job, 0, 1000))
+            server.kill()
+            asked = [client.http.get("/v1/machines"), client.http.put("/v1/toolings/T1", json=example()), client.http.get("/ready")]
+            assert {answer.status_code for answer in asked} == {503}
+            server.start()
+            # by themselves: neither process was started anew
+            until(lambda: len(store.jobs.events(job, 0, 1000)) > told)
+            assert workers(store) == [second]
         kill([service.pid])
     with started(folder, url) as (client, service):
         assert client.job(job).state == "running"

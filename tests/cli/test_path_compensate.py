@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.identification.arm.parameters import PosedLayout
-from rcsa_ident.identification.arm.priors import arm_priors, posed_prior_rows
+from rcsa_ident.identification.arm.unknowns import PosedLayout, arm_priors
+from rcsa_ident.identification.unknowns import prior_rows
 from rcsa_ident.io.paths.gcode import read_gcode
 from rcsa_ident.io.paths.tool_paths import read_tool_path
 from rcsa_ident.io.settings.robots import robot_keys
@@ -138,9 +138,9 @@ def robot_result(path, spread):
     model = robot("kr210")
     springs = tuple(model.chain().stiffness.tolist())
     layout = PosedLayout(springs, len(model.joints))
-    rows = posed_prior_rows(layout, arm_priors(model))
+    rows = prior_rows(layout, arm_priors(model))
     sizes = np.full(layout.size, 1e-6)
-    sizes[layout.compliances] = spread
+    sizes[layout.arm.parts["compliances"]] = spread
     content = {
         "kind": "identified robot",
         "schema_version": 1,

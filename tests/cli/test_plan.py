@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli.plan import plan
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack, parameter_names
+from rcsa_ident.identification.modal_parameters import ModalParameters
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.unknowns import ModalBlock, pack, parameter_names
 from rcsa_ident.io.results.parts import spindle_to_json, write_result
 from rcsa_ident.io.settings.setups import read_campaign
 
@@ -37,9 +38,9 @@ def axis_of(axis, shift, speed_range):
     natural = 2.0 * np.pi * shift * np.array([950.0, 1750.0, 3300.0])
     shapes = np.array([[0.14, 0.12], [0.18, -0.2], [0.15, 0.4]])
     factor = np.diag(np.sqrt(2.0 * 0.05 * natural))
-    physics = AxisParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros((3, 0)), np.zeros((0, 2)), np.zeros((0, 0)))
+    physics = ModalParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros((3, 0)), np.zeros((0, 2)), np.zeros((0, 0)))
     theta = np.concatenate([pack(physics), np.log([3e9, 6e6, 2e3, 10.0])])
-    layout = AxisLayout(3)
+    layout = ModalBlock(3)
     data = spindle_to_json(*Posterior(theta, 4e-4 * np.eye(theta.size), layout).machine(axis))
     data |= {"layout": {"modes": 3, "softening": False}, "unknowns": theta, "model_error": 2e-3}
     data |= {"covariance": {"parameters": list(parameter_names(layout)), "matrix": 4e-4 * np.eye(theta.size)}}

@@ -14,6 +14,11 @@ import pytest
 
 import rcsa_ident as ri
 from rcsa_ident.front import verbs
+from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
+from rcsa_ident.identification.arm.result import RobotIdentification
+from rcsa_ident.identification.arm.unknowns import PosedLayout, arm_priors
+from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.unknowns import prior_rows
 from tests.fixtures import by_hand
 from tests.fixtures.paths import SAMPLES
 from tests.fixtures.waiting import PATIENCE
@@ -55,6 +60,26 @@ def test_identify_reads_and_judges_itself(two_cuts, capsys):
     assert found.data["seed"] == 7
     assert found.machine.sensors == two_cuts.sensors
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_robot_is_identified_by_the_same_verb(two_cuts, monkeypatch, tmp_path):
+    sheet = ri.sample_robot("tx200")
+    priors = arm_priors(sheet)
+    layout = PosedLayout(priors.springs, len(sheet.joints) + (sheet.payload is not None), 1)
+    rows = prior_rows(layout, priors)
+    best = RobotUnknowns(rows.centre, layout)
+    posterior = RobotPosterior(sheet, True, best, 1e-4 * np.eye(layout.size), rows.spread)
+
+    def answered(campaign, readings, robot, seed, map):
+        ids = tuple(cut.id for cut in campaign.cuts)
+        return RobotIdentification(Status.CONVERGED, (), (), seed, posterior, (0.01, 0.01), 1.0, ids, np.zeros((1, 6)), (5.0, 400.0))
+
+    monkeypatch.setattr("rcsa_ident.workflows.identify_robot.identify_robot", answered)
+    found = ri.identify(two_cuts, seed=7, robot=sheet, processes=1)
+    assert (found.status, found.reasons, found.left_out, found.data["seed"]) == (Status.CONVERGED, (), {}, 7)
+    np.testing.assert_array_equal(ri.read_robot_result(found.save(tmp_path / "RESULT.json")).best.theta, best.theta)
+    with pytest.raises(ri.InputError, match="begins at the data sheet"):
+        ri.identify(two_cuts, method="paper", robot=sheet)
 
 
 def test_progress_is_one_line_that_ends_with_the_answer(two_cuts, monkeypatch):

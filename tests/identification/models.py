@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, flange_layout
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import DAMPING_UNIT, JOINT, flange_layout
 
 
 def remade(data, theta, layout, rng, noise=1e-2, scatter=0.0):

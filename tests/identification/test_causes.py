@@ -9,12 +9,12 @@ from rcsa_ident.identification.causes import BELIEVED, Cause, causes, with_order
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import evidence
-from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.rough_data import with_distances
+from rcsa_ident.identification.unknowns import Layout, ModalBlock
 from tests.identification.models import vector_of
 
-LAYOUT = Layout((AxisLayout(3), AxisLayout(3)))
+LAYOUT = Layout((ModalBlock(3), ModalBlock(3)))
 THETA = vector_of(LAYOUT, ((600.0, 1400.0, 2600.0), (700.0, 1500.0, 2500.0)))
 NOISE = 2e-3
 

@@ -12,7 +12,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import directions
 from rcsa_ident.identification.machine import MOST_KEPT_OF_BOTH
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, flange_modes, unpack
+from rcsa_ident.identification.modal_parameters import flange_modes
+from rcsa_ident.identification.unknowns import JOINT, ModalBlock, unpack
 from rcsa_ident.workflows.identify import mode_deviations
 from tests.fixtures import by_hand, coupled_by_hand
 
@@ -59,7 +60,7 @@ def test_each_plane_starts_from_the_modes_that_move_it(turning):
     standing = whole.best.standing()
     for axis, first in ((Dof.X, 0), (Dof.Y, 2)):
         start = machine.starts()[axis]
-        assert start.layout == AxisLayout(2)
+        assert start.layout == ModalBlock(2)
         own = flange_modes(unpack(start.theta[:-JOINT], start.layout), axis)
         near = np.abs(np.cos(directions(standing) - (0.0 if axis is Dof.X else 0.5 * np.pi))) > 0.9
         np.testing.assert_allclose(own.omega_n, standing.omega_n[near], rtol=1e-3)

@@ -14,13 +14,13 @@ from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.diagnostics import EXACT_DRAWINGS
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
-from rcsa_ident.identification.parameters import AxisLayout, Layout, parameter_names
 from rcsa_ident.identification.preview import Preview
 from rcsa_ident.identification.progress import BOTH, Stage
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
+from rcsa_ident.identification.unknowns import Layout, ModalBlock, parameter_names
 from tests.fixtures import by_hand
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 from tests.identification.models import vector_of
@@ -111,7 +111,7 @@ def test_the_result_tells_its_story(campaign, found):
         assert set(result.per_tooling) == set(data.toolings)
         assert result.model_error < 0.01
         posterior = result.posterior
-        assert posterior.layout == AxisLayout(result.modes.omega_n.size)
+        assert posterior.layout == ModalBlock(result.modes.omega_n.size)
         assert result.parameters == parameter_names(posterior.layout)
         assert posterior.theta.size == len(result.parameters) == posterior.covariance.shape[0]
         assert np.linalg.eigvalsh(posterior.covariance).min() > 0.0
@@ -433,7 +433,7 @@ def test_a_task_without_a_finite_answer_ends_the_search_wherever_it_ran(shop, ca
 def test_passes_are_searched_until_two_searches_agree_and_the_likeliest_answer_counts(shop, monkeypatch, evidences, searches, chosen):
     cuts, _ = shop.measurements(np.random.default_rng(1), fixture=False)
     data = shop.prepare([replace(cut, acceleration=200.0, length=0.28) for cut in cuts[::4]])
-    layout = Layout((AxisLayout(3), AxisLayout(3)), len(data.coefficient_spread))
+    layout = Layout((ModalBlock(3), ModalBlock(3)), len(data.coefficient_spread))
     solution = SimpleNamespace(theta=vector_of(layout, ((600.0, 1400.0, 2500.0),) * 2), layout=layout)
     asked, sequences = [], set()
 

@@ -27,9 +27,9 @@ from rcsa_ident.identification.experiment_design import (
 )
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import Layout, ModalBlock, flange_layout
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from tests.identification.models import machine_vector, remade, vector_of
 
@@ -147,8 +147,8 @@ def posterior_of(layout, frequency_hz, seed, rivals=(), deviation=0.01, speed_ra
 def posteriors():
     rival = machine_vector((700.0, 2500.0), 7)
     return {
-        Dof.X: posterior_of(AxisLayout(3), (600.0, 1400.0, 2600.0), 1, (rival,)),
-        Dof.Y: posterior_of(AxisLayout(2, softening=True), (800.0, 2100.0), 2),
+        Dof.X: posterior_of(ModalBlock(3), (600.0, 1400.0, 2600.0), 1, (rival,)),
+        Dof.Y: posterior_of(ModalBlock(2, softening=True), (800.0, 2100.0), 2),
     }
 
 
@@ -199,9 +199,9 @@ def test_information_is_that_of_the_misfit(shop):
     theta = machine_vector((600.0, 1400.0, 2600.0))
     data = planned(shop, np.linspace(8000.0, 20000.0, 6), axes=(Dof.X,))
     root = 0.02 * np.random.default_rng(3).standard_normal((theta.size, theta.size))
-    posterior = Posterior(theta, root @ root.T, AxisLayout(3))
+    posterior = Posterior(theta, root @ root.T, ModalBlock(3))
     rows = information(data, {Dof.X: posterior}, {Dof.X: 1e-3})
-    layout = Layout((AxisLayout(3),), len(data.coefficient_spread))
+    layout = Layout((ModalBlock(3),), len(data.coefficient_spread))
     full = np.concatenate([theta, np.zeros(layout.coefficients)])
     nuisance = np.zeros((len(data.cut_ids), 2))
     model = Misfit(data, Priors(), (1e-3,)).evaluate(full, layout, nuisance).models[0]
@@ -286,7 +286,7 @@ def test_the_expected_band_is_that_of_an_identification_which_made_the_cuts(few,
     def identified(part):
         misfit = Misfit(replace(data, axes=(part,)), Priors(), (5e-4,))
         solution = refine(misfit, theta, flange_layout(3), np.zeros((len(data.cut_ids), 2)), 100, grid=32)
-        return Posterior(solution.theta, np.linalg.inv(solution.evaluation.hessian), AxisLayout(3))
+        return Posterior(solution.theta, np.linalg.inv(solution.evaluation.hessian), ModalBlock(3))
 
     first, second = identified(axis.of(early)), identified(axis)
     rows = information(replace(data, axes=(axis.of(~early),)), {Dof.X: first}, {Dof.X: 5e-4})

@@ -15,11 +15,12 @@ from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import GAIN_SPREAD, with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines, noise_of, thinned
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_modes, joint_of, unpack
+from rcsa_ident.identification.modal_parameters import flange_modes
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.sweep_correction import unswept
+from rcsa_ident.identification.unknowns import Layout, ModalBlock, joint_of, unpack
 from rcsa_ident.tool_holder.model import point_name, receptance_at_points, tool_holder_receptance
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA
@@ -90,7 +91,7 @@ def test_the_model_is_that_of_coupled_receptances(shop, first, response, force):
     omega = OMEGA[::40]
     test = HammerLines("1", first, Dof.X, omega, np.ones(omega.size), np.ones(omega.size), response, force)
     data = with_tests(None, [test], at_points(shop))
-    layout = Layout((AxisLayout(3),), len(data.coefficient_spread))
+    layout = Layout((ModalBlock(3),), len(data.coefficient_spread))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0),))
     theta[layout.force] = 0.03
     (found,) = model_of(data, theta, layout)
@@ -140,7 +141,7 @@ def test_beside_passes_cuts_sweep_and_hits_do_not(shop, first):
     passes = shop.prepare([replace(cut, acceleration=200.0, length=0.28) for cut in cuts])
     tests, _ = hit(shop, first, np.random.default_rng(SEED), axes=(Dof.X,))
     both = with_tests(passes, tests, at_points(shop))
-    layout = Layout((AxisLayout(3), AxisLayout(3)), len(both.coefficient_spread))
+    layout = Layout((ModalBlock(3), ModalBlock(3)), len(both.coefficient_spread))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0),) * 2)
     freed, beside = (unswept(each, Priors(), theta, layout) for each in (passes, both))
     for alone, measured, found in zip(freed.axes, both.axes, beside.axes, strict=True):
@@ -165,7 +166,7 @@ def test_the_published_method_refuses_them(shop, first):
 def test_a_sensors_mass_belongs_to_the_test_and_not_to_the_machine(shop, first):
     omega = OMEGA[::40]
     light, heavy = (HammerLines("1", first, Dof.X, omega, np.ones(omega.size), np.ones(omega.size), 0.0, 0.0, mass) for mass in (0.0, 0.02))
-    layout = Layout((AxisLayout(3),), 1)
+    layout = Layout((ModalBlock(3),), 1)
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0),))
     theta[layout.force] = 0.0
     plain, loaded = (model_of(with_tests(None, [test], at_points(shop)), theta, layout)[0][:, 0] for test in (light, heavy))

@@ -16,12 +16,12 @@ from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
+from rcsa_ident.identification.unknowns import Layout, ModalBlock
 from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, shares_of
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, oblique, open_shop
@@ -114,7 +114,7 @@ def test_places_that_are_measured_beside_each_other(data):
         return replace(axis, lines=np.repeat(axis.lines, 3, axis=1), variance=np.repeat(axis.variance, 3, axis=1), shares=shares)
 
     many = replace(data, axes=tuple(wide(axis) for axis in data.axes))
-    layout = Layout((AxisLayout(3, 2), AxisLayout(2, 2)), len(data.coefficient_spread))
+    layout = Layout((ModalBlock(3, 2), ModalBlock(2, 2)), len(data.coefficient_spread))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     misfit = Misfit(many, Priors(), (0.1, 0.1))
     for i, models in enumerate(misfit.models(theta, layout)):

@@ -6,8 +6,8 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import Layout, ModalBlock, flange_layout
 from tests.identification.models import machine_vector, remade, vector_of
 
 LAYOUT = flange_layout(3)
@@ -86,7 +86,7 @@ def test_light_damping_is_raised_as_far_as_a_step_needs(misfit, theta):
 
 def test_everything_at_once_converges(rich):
     """Two axes and outputs, softening, scales of the forces, tooth angles: lines of the model itself, an honest cost."""
-    layout = Layout((AxisLayout(3, 1, True), AxisLayout(2, 1, True)), len(rich.coefficient_spread), rich.clampings)
+    layout = Layout((ModalBlock(3, 1, True), ModalBlock(2, 1, True)), len(rich.coefficient_spread), rich.clampings)
     truth = vector_of(layout, ((600.0, 1400.0, 2600.0), (900.0, 2100.0)))
     truth[layout.force] *= 0.05
     data, delay = remade(rich, truth, layout, np.random.default_rng(3), noise=1e-3)

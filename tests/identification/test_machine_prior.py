@@ -9,13 +9,13 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.assemble_result import WIDER
 from rcsa_ident.identification.machine_prior import Gaussian, KnownMachine
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.tooling_update import FurtherFit
+from rcsa_ident.identification.unknowns import JOINT, Layout, ModalBlock
 from rcsa_ident.tool_holder.alteration import ALTERATIONS
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 
-ONE_MODE = AxisLayout(1)
+ONE_MODE = ModalBlock(1)
 CORE = ONE_MODE.size
 #: Of X, Y, joint and two numbers of toolings.
 SIZE = 2 * CORE + JOINT + 2

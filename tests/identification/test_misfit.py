@@ -5,9 +5,9 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import DELAY_UNIT, Misfit, Residual
-from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.rough_data import with_distances
+from rcsa_ident.identification.unknowns import Layout, ModalBlock, flange_layout
 from tests.identification.models import vector_of
 
 FREQUENCIES = ((600.0, 1400.0, 2500.0), (900.0, 2100.0))
@@ -62,7 +62,7 @@ def case(request, few, rich, rough):
         return Case(few, flange_layout(3, 2), "plain")
     # one sensor looks behind the flange, one at the holder, and nobody knows where exactly
     data = with_distances(rich, np.array([0.03, -0.02]), np.array([0.02, 0.005])) if request.param == "all" else rough
-    layout = Layout((AxisLayout(3, 1, True), AxisLayout(2, 1, True)), len(data.coefficient_spread), data.clampings)
+    layout = Layout((ModalBlock(3, 1, True), ModalBlock(2, 1, True)), len(data.coefficient_spread), data.clampings)
     return Case(data, layout, request.param)
 
 
@@ -142,7 +142,7 @@ def test_where_a_sensor_looks_is_what_was_told_and_what_is_left_of_it(rich):
     # of one that is told as exact next to nothing is left
     assert data.coefficient_spread[count:] == pytest.approx((0.2, 1e-4))
     misfit = Misfit(data, Priors(), SHARES)
-    layout = Layout((AxisLayout(3, 1), AxisLayout(2, 1)), count + 2, data.clampings)
+    layout = Layout((ModalBlock(3, 1), ModalBlock(2, 1)), count + 2, data.clampings)
     theta = vector_of(layout, FREQUENCIES)
     theta[layout.force][count:] = [-0.1, 0.01]
     np.testing.assert_allclose([misfit.seen_at(i, theta, layout) for i in (0, 1)], [[0.2, 0.0], [-0.19, 1.0]])
@@ -244,7 +244,7 @@ def test_border_is_that_of_the_dense_augmented_problem(case, i):
 
 
 def test_compliance_is_the_change_with_the_flange(case):
-    """What `promising` puts a new mode on: d residual / d (tt, tr, rr) of the flange's receptance."""
+    """What `model_order.more` puts a new mode on: d residual / d (tt, tr, rr) of the flange's receptance."""
     layout = case.layout.axes[0]
     first = case.layout.axis(0).start + layout.core - 3
     axis_factor = case.theta[first : first + 3] * np.sqrt(1e-9)
@@ -293,7 +293,7 @@ def test_without_delay_is_the_model_plus_its_residual(case):
 
 
 def test_two_outputs_add_up_to_the_model_of_one(rich):
-    layout = Layout((AxisLayout(3, 1), AxisLayout(2, 1)))
+    layout = Layout((ModalBlock(3, 1), ModalBlock(2, 1)))
     theta = vector_of(layout, FREQUENCIES)
     nuisance = np.zeros((len(rich.cut_ids), 2))
     both = Misfit(rich, Priors(), SHARES).evaluate(theta, layout, nuisance).models

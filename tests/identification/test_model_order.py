@@ -8,6 +8,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import (
+    close_pairs,
     cut_weights,
     drop_modes,
     evidence,
@@ -15,13 +16,13 @@ from rcsa_ident.identification.model_order import (
     grow_modes,
     merged,
     model_error,
-    promising,
+    more,
 )
-from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout, pack, unpack, with_mode, without_mode
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
+from rcsa_ident.identification.unknowns import Layout, ModalBlock, flange_layout, pack, unpack
 from tests.identification.models import machine_vector, own, remade, vector_of
-from tests.identification.test_parameters import receptance
+from tests.identification.test_unknowns import receptance
 
 BAND = (530.0, 4300.0)
 TRUE = flange_layout(3)
@@ -44,7 +45,7 @@ def with_two_more(theta, rng):
     """The same machine with two modes of hardly any shape at 1000 and 3500 Hz."""
     m, n = 3, 5
     part, joint = own(theta), theta[-4:]
-    more = np.zeros(AxisLayout(n).size)
+    more = np.zeros(ModalBlock(n).size)
     more[:n] = [*part[:m], *np.log(2.0 * np.pi * np.array([1000.0, 3500.0]))]
     more[n : 3 * n] = [*part[m : 3 * m], *(0.05 * rng.standard_normal(4))]
     rows, cols = np.tril_indices(n)
@@ -82,16 +83,21 @@ def known(few, theta):
 def poor(request, known, theta):
     """The best that can be done without one of the modes."""
     data, misfit, right = known
-    left = without_mode(unpack(own(theta), TRUE.axes[0]), request.param)
+    left = unpack(own(theta), TRUE.axes[0]).without_mode(request.param)
     found = refine(misfit, np.concatenate([pack(left), theta[-4:]]), flange_layout(2), nothing(data), 60, grid=32)
     assert evidence(found, misfit) > evidence(right, misfit) + 100.0
     return request.param, found
 
 
+def more_of(solution, misfit, i, band):
+    """An axis with one mode more."""
+    return [unpack(theta[layout.axis(i)], layout.axes[i]) for theta, layout in more(solution, misfit, i, band)]
+
+
 def test_a_mode_that_was_taken_out_is_the_most_promising(known, poor):
     _, misfit, _ = known
     missing, solution = poor
-    found = promising(solution, misfit, 0, BAND)
+    found = more_of(solution, misfit, 0, BAND)
     assert 1 <= len(found) <= 3
     assert all(axis.order == 3 for axis in found)
     # the grid's step is 15 %
@@ -107,11 +113,11 @@ def test_promise_of_a_weak_mode_is_kept(known, theta, place):
     shape = np.array([0.03, -0.02])
     # at a place of the grid
     frequency = np.geomspace(0.3 * BAND[0], 2.5 * BAND[1], 30)[place]
-    more = with_mode(unpack(own(theta), TRUE.axes[0]), 2.0 * np.pi * frequency, tuple(shape), 0.06)
+    more = unpack(own(theta), TRUE.axes[0]).with_mode(2.0 * np.pi * frequency, tuple(shape), 0.06)
     lines, delay = remade(known[0], np.concatenate([pack(more), theta[-4:]]), flange_layout(4), np.random.default_rng(3), noise=0.0)
     misfit = Misfit(lines, Priors(), (1e-3,))
     without = refine(misfit, theta, TRUE, np.stack([delay, 0.0 * delay], axis=1), 60)
-    first = promising(without, misfit, 0, BAND)[0]
+    first = more_of(without, misfit, 0, BAND)[0]
     assert first.omega_n[0] / (2.0 * np.pi) == pytest.approx(frequency, rel=1e-9)
     sign = np.sign(first.psi[0] @ shape)
     np.testing.assert_allclose(sign * first.psi[0], shape, rtol=0.15)
@@ -119,7 +125,7 @@ def test_promise_of_a_weak_mode_is_kept(known, theta, place):
 
 def test_promising_with_everything_unknown(rich):
     """Two outputs, softening, uncertain forces, tooth angles: the missing mode is found in the axis that lacks it."""
-    axes = (AxisLayout(3, 1, True), AxisLayout(2, 1, True))
+    axes = (ModalBlock(3, 1, True), ModalBlock(2, 1, True))
     layout = Layout(axes, len(rich.coefficient_spread), rich.clampings)
     theta = vector_of(layout, ((600.0, 1400.0, 2600.0), (900.0, 2100.0)))
     theta[layout.force] *= 0.02
@@ -131,10 +137,10 @@ def test_promising_with_everything_unknown(rich):
     data = replace(data, edge=np.column_stack([edge, rich.edge[:, 1]]))
     misfit = Misfit(data, Priors(), (5e-4, 5e-4))
     poor_axes = (replace(axes[0], modes=2), axes[1])
-    left = pack(without_mode(unpack(theta[layout.axis(0)], axes[0]), 1), poor_axes[0])
+    left = pack(unpack(theta[layout.axis(0)], axes[0]).without_mode(1), poor_axes[0])
     vector = np.concatenate([left, theta[layout.axis(0).stop :]])
     poor = refine(misfit, vector, replace(layout, axes=poor_axes), np.stack([delay, 0.0 * delay], axis=1), 0)
-    found = promising(poor, misfit, 0, BAND)
+    found = more_of(poor, misfit, 0, BAND)
     assert abs(np.log(found[0].omega_n[0] / (2.0 * np.pi * 1400.0))) < 0.15
     assert found[0].softening.shape == (3, 3)
     assert found[0].places.shape == (3, 1)
@@ -206,25 +212,22 @@ def test_merged_identical_modes_are_the_same_machine():
     double = replace(
         axis, omega_n=omega_n, psi=psi, factor=factor, places=np.array([[0.05], [0.1], [0.2]]), place_residual=np.zeros((1, 2))
     )
-    found = merged(double)
-    assert len(found) == 1
-    assert found[0].order == 2
+    ((low, high),) = close_pairs(double)
+    found = merged(double, low, high).without_mode(high)
+    assert found.order == 2
     omega = 2.0 * np.pi * np.linspace(100.0, 4000.0, 60)
     # what the fixture does when it is itself pushed is not asked
-    expected, values = (receptance(each, omega)[:, :, :2] for each in (double, found[0]))
+    expected, values = (receptance(each, omega)[:, :, :2] for each in (double, found))
     np.testing.assert_allclose(values, expected, rtol=1e-7, atol=1e-12 * np.abs(expected).max())
 
 
 def test_merged_are_neighbours_only():
     axis = unpack(own(machine_vector((600.0, 1400.0, 2600.0))), TRUE.axes[0])
-    assert merged(axis) == []
+    assert close_pairs(axis) == []
     close = replace(axis, omega_n=np.array([1.0, 1.1, 1.25]) * axis.omega_n[0])
-    found = merged(close)
-    assert len(found) == 2
-    for each, pair in zip(found, ((0, 1), (1, 2)), strict=True):
-        both = close.omega_n[list(pair)]
-        low = np.argmin(np.abs(each.omega_n - both.mean()))
-        assert both.min() < each.omega_n[low] < both.max()
+    assert close_pairs(close) == [(0, 1), (1, 2)]
+    for low, high in close_pairs(close):
+        assert close.omega_n[low] < merged(close, low, high).omega_n[low] < close.omega_n[high]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -6,16 +6,16 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, flange_layout, unpack
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import JOINT, Layout, ModalBlock, flange_layout, unpack
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from tests.identification.models import machine_vector, remade, vector_of
-from tests.identification.test_parameters import receptance
+from tests.identification.test_unknowns import receptance
 
-THREE = AxisLayout(3)
-SOFT = AxisLayout(3, softening=True)
+THREE = ModalBlock(3)
+SOFT = ModalBlock(3, softening=True)
 SPEEDS = (1500.0, 600.0)
 OMEGA = 2.0 * np.pi * np.linspace(500.0, 4000.0, 60)
 
@@ -98,7 +98,7 @@ def test_each_rival_adds_its_difference(theta, tip):
     np.testing.assert_allclose(rows[:-3], spread(alone, tip), rtol=1e-12)
     here = tip(*alone.machine(Dof.X))
     for row, rival, modes in zip(rows[-3:], rivals, (2, 4, 3), strict=True):
-        other = Posterior(rival, np.eye(rival.size), AxisLayout(modes))
+        other = Posterior(rival, np.eye(rival.size), ModalBlock(modes))
         np.testing.assert_allclose(row, tip(*other.machine(Dof.X)) - here, rtol=1e-9, atol=1e-20)
     np.testing.assert_array_equal(rows[-1], 0.0)
     # a rival alone is a band, too
@@ -107,10 +107,10 @@ def test_each_rival_adds_its_difference(theta, tip):
 
 
 def test_rivals_change_with_speed_as_well(soft, tip):
-    rival = vector_of(Layout((AxisLayout(2, softening=True),)), ((620.0, 2500.0),), seed=2)
+    rival = vector_of(Layout((ModalBlock(2, softening=True),)), ((620.0, 2500.0),), seed=2)
     posterior = Posterior(soft, np.zeros((soft.size, soft.size)), SOFT, SPEEDS, (rival,))
     row = spread(posterior, tip, 2100.0)[0]
-    other = Posterior(rival, np.eye(rival.size), AxisLayout(2, softening=True), SPEEDS)
+    other = Posterior(rival, np.eye(rival.size), ModalBlock(2, softening=True), SPEEDS)
     expected = tip(*other.machine(Dof.X, speed=2100.0)) - tip(*posterior.machine(Dof.X, speed=2100.0))
     np.testing.assert_allclose(row, expected, rtol=1e-9)
 

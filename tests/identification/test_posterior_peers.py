@@ -10,9 +10,9 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import DELAY_UNIT, Misfit
-from rcsa_ident.identification.parameters import flange_layout
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import flange_layout
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from tests.identification.models import machine_vector, remade
 

@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
-from rcsa_ident.identification.priors import Priors, prior_rows
+from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import Layout, ModalBlock, flange_layout, prior_rows
 
 PRIORS = Priors(
     frequency_hz=1200.0,
@@ -20,8 +20,8 @@ UNIT = 30.0  # of the damping factor [sqrt(rad/s)]
 LAYOUTS = {
     "one mode": flange_layout(1),
     "two axes": flange_layout(2, 4),
-    "fixture": Layout((AxisLayout(3, places=1),), coefficients=2),
-    "everything": Layout((AxisLayout(2, 1, True), AxisLayout(3, 1, True)), coefficients=3, clampings=2),
+    "fixture": Layout((ModalBlock(3, places=1),), coefficients=2),
+    "everything": Layout((ModalBlock(2, 1, True), ModalBlock(3, 1, True)), coefficients=3, clampings=2),
 }
 SPREADS = (0.05, 0.1, 3.0)
 
@@ -116,5 +116,5 @@ def test_wider_priors_fill_more():
     assert prior_rows(flange_layout(3), narrow).log_volume - prior_rows(flange_layout(3), wide).log_volume == pytest.approx(
         2.0 * 6 * np.log(10.0)
     )
-    fixture = Layout((AxisLayout(3, places=1),))
+    fixture = Layout((ModalBlock(3, places=1),))
     assert prior_rows(fixture, narrow).log_volume - prior_rows(fixture, wide).log_volume == pytest.approx(2.0 * 9 * np.log(10.0))

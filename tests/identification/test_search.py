@@ -3,9 +3,9 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, flange_layout, lower_triangle
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.search import SearchSettings, _by_frequency, explore, starts
+from rcsa_ident.identification.unknowns import DAMPING_UNIT, JOINT, flange_layout, lower_triangle
 from tests.identification.models import machine_vector, remade
 
 SMALL = SearchSettings(modes=4, population=4, generations=3, steps=3)

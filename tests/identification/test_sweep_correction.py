@@ -9,9 +9,9 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.cut_data import prepare
 from rcsa_ident.identification.data import NODE
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import flange_layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.sweep_correction import unswept
+from rcsa_ident.identification.unknowns import flange_layout
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement

@@ -12,11 +12,11 @@ from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines, noise_of, thinned
 from rcsa_ident.identification.machine_prior import KnownMachine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.rough_data import with_rough_toolings
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.tooling_update import fit_further
+from rcsa_ident.identification.unknowns import Layout, ModalBlock
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings
@@ -121,7 +121,7 @@ def of_one_tap(shop, clamped, drawn=None, cuts=None):
 def test_slopes_of_a_tap_are_those_of_its_residuals(shop, few):
     """By what the drawings do not tell: differences of two steps, whose error of second order is taken out."""
     data = of_one_tap(shop, shop.held_out, cuts=few)
-    layout = Layout((AxisLayout(3, 0, True, True), AxisLayout(2, 0, True, True)), len(data.coefficient_spread))
+    layout = Layout((ModalBlock(3, 0, True, True), ModalBlock(2, 0, True, True)), len(data.coefficient_spread))
     misfit = Misfit(data, Priors(), (0.02, 0.05))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     first, count = layout.force.start + data.rough_place.start, len(data.rough.unknowns)

@@ -12,8 +12,9 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.uncertain import Doubted as DoubtedOf
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.identification.parameters import AxisLayout, flange_modes, joint_of, pack, simple_axis
+from rcsa_ident.identification.modal_parameters import flange_modes, flange_of
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.unknowns import ModalBlock, joint_of, pack
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine
 from rcsa_ident.machine.spindle import Spindle
@@ -39,8 +40,8 @@ def assembly():
 def posterior_of(shift, softening):
     natural = 2.0 * np.pi * shift * np.array([900.0, 2000.0])
     damping = np.diag(2.0 * np.array([0.05, 0.04]) * natural)
-    axis = simple_axis(natural, np.array([[0.15, 0.1], [0.2, -0.3]]), np.linalg.cholesky(damping), np.diag([2e-5, 3e-5]))
-    layout = AxisLayout(2, softening=softening)
+    axis = flange_of(natural, np.array([[0.15, 0.1], [0.2, -0.3]]), np.linalg.cholesky(damping), np.diag([2e-5, 3e-5]))
+    layout = ModalBlock(2, softening=softening)
     changes = np.array([[-0.04, 0.01], [0.01, -0.06]])
     theta = np.concatenate([pack(replace(axis, softening=changes), layout), LOGS])
     root = 2e-3 * np.random.default_rng(1).standard_normal((theta.size, theta.size))
@@ -73,7 +74,7 @@ def coupled_by_hand(posterior, axis, assembly, x):
     """Coupled without the machine: the vector's own modes at relative speed x, by the coupling's general solution."""
     holder = tool_holder_receptance(assembly, OMEGA, axis)
     natural = np.exp(posterior.theta[:2])
-    physics = simple_axis(natural, posterior.theta[2:6].reshape(2, 2), np.zeros((2, 2)), np.diag([2e-5, 3e-5]))
+    physics = flange_of(natural, posterior.theta[2:6].reshape(2, 2), np.zeros((2, 2)), np.diag([2e-5, 3e-5]))
     lower = np.zeros((2, 2))
     lower[np.tril_indices(2)] = 30.0 * np.where([True, False, True], np.exp(posterior.theta[6:9]), posterior.theta[6:9])
     change = np.zeros((2, 2))

@@ -18,11 +18,11 @@ from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.unknowns import ModalBlock, parameter_names
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
 from rcsa_ident.report.summaries import coefficient_rows, lobes_curves, lobes_summary, mode_rows, recording_rows, two_digits
@@ -76,7 +76,7 @@ def found():
     value = 1e-4 / omega * np.exp(-1j * omega / 3e3)
     measured = {"omega": omega, "value": value, "model": value, "cut": np.arange(12) % 2, "coherence": np.ones(12)}
     joint = LumpedJoint(2e9, 5e6, 1e4, 10.0)
-    layout = AxisLayout(1)
+    layout = ModalBlock(1)
     covariance = np.diag([1.0] * layout.size + [1e-4, 1.0, 1e-4, 1e-4])
     posterior = Posterior(np.zeros(layout.size + 4), covariance, layout)
     part = AxisResult(modes, joint, 1.23, {NAME: 1.23}, 0.004, parameter_names(layout), posterior, measured)

@@ -10,8 +10,9 @@ import pytest
 from rcsa_ident.base.remarks import says
 from rcsa_ident.cutting.shape import CutterCode
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.parameters import AxisLayout, pack, simple_axis
+from rcsa_ident.identification.modal_parameters import flange_of
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.unknowns import ModalBlock, pack
 from rcsa_ident.workflows.identify import mode_deviations, of_campaign
 from tests.fixtures import by_hand
 
@@ -24,7 +25,7 @@ def identification_of(posterior):
 @pytest.mark.slow
 def test_an_uncoupled_mode_in_closed_form():
     natural, zeta = np.array([5000.0, 12000.0]), np.array([0.03, 0.06])
-    axis = simple_axis(natural, np.ones((2, 2)), np.diag(np.sqrt(2.0 * zeta * natural)), np.eye(2) * 1e-5)
+    axis = flange_of(natural, np.ones((2, 2)), np.diag(np.sqrt(2.0 * zeta * natural)), np.eye(2) * 1e-5)
     theta = np.concatenate([pack(axis), by_hand.JOINT_LOGS])
     covariance = np.zeros((theta.size,) * 2)
     # log omega_n of both, and log L_00, log L_11 behind the frequencies and shapes
@@ -32,7 +33,7 @@ def test_an_uncoupled_mode_in_closed_form():
     for n, place in ((0, 6), (1, 8)):
         covariance[n, n], covariance[place, place] = s_omega**2, s_factor**2
         covariance[n, place] = covariance[place, n] = correlation * s_omega * s_factor
-    known = Posterior(theta, covariance, AxisLayout(2))
+    known = Posterior(theta, covariance, ModalBlock(2))
     omega_std, zeta_std = mode_deviations(identification_of(known))[Dof.X]
     np.testing.assert_allclose(omega_std, s_omega * natural, rtol=1e-7)
     # zeta = L^2 / (2 omega_n)
@@ -54,9 +55,9 @@ def test_coupled_modes_scatter_as_drawn_machines_do():
 
 def test_an_overdamped_mode_has_its_two_real_poles():
     natural = np.array([5000.0, 9000.0])
-    axis = simple_axis(natural, np.ones((2, 2)), np.diag(np.sqrt(2.0 * np.array([0.05, 1.5]) * natural)), np.eye(2) * 1e-5)
+    axis = flange_of(natural, np.ones((2, 2)), np.diag(np.sqrt(2.0 * np.array([0.05, 1.5]) * natural)), np.eye(2) * 1e-5)
     theta = np.concatenate([pack(axis), by_hand.JOINT_LOGS])
-    known = Posterior(theta, 1e-6 * np.eye(theta.size), AxisLayout(2))
+    known = Posterior(theta, 1e-6 * np.eye(theta.size), ModalBlock(2))
     omega_std, zeta_std = mode_deviations(identification_of(known))[Dof.X]
     modes = known.machine(Dof.X)[0]
     assert omega_std.size == modes.omega_n.size == 3

@@ -13,8 +13,9 @@ from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.identification.experiment_design import Volume
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack
+from rcsa_ident.identification.modal_parameters import ModalParameters
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.unknowns import ModalBlock, pack
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
@@ -34,10 +35,10 @@ def machine_of(deviation=0.05, seed=1):
         natural = 2.0 * np.pi * shift * np.array([150.0, 950.0, 1750.0, 3300.0])
         shapes = np.array([[0.08, 0.05], [0.14, 0.12], [0.18, -0.2], [0.15, 0.4]])
         factor = np.diag(np.sqrt(2.0 * 0.05 * natural))
-        physics = AxisParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros((4, 0)), np.zeros((0, 2)), np.zeros((0, 0)))
+        physics = ModalParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros((4, 0)), np.zeros((0, 2)), np.zeros((0, 0)))
         theta = np.concatenate([pack(physics), np.log([3e9, 6e6, 2e3, 10.0])])
         own = deviation * np.exp(rng.uniform(-2.0, 0.0, theta.size))
-        posterior = Posterior(theta, np.diag(own**2), AxisLayout(4))
+        posterior = Posterior(theta, np.diag(own**2), ModalBlock(4))
         modes, joint = posterior.machine(axis)
         machine[axis] = MachineAxis(Spindle(modes), joint, posterior)
     return IdentifiedMachine(machine, (2.0 * np.pi * BAND[0], 2.0 * np.pi * BAND[1]))

@@ -17,8 +17,8 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.arm.data import body_masses
-from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.static import REPEATABILITY, StaticTests, expected_information
+from rcsa_ident.identification.arm.unknowns import arm_priors
 from rcsa_ident.identification.experiment_design import d_optimal
 from rcsa_ident.machine.robot.compliance import twist_per_payload
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of
@@ -144,7 +144,7 @@ def stable_cuts(robot: RobotModel, noise: float = CUT_NOISE) -> Experiment:
     """Return slow stable cuts, as `identify_robot` takes them: the flange's motion along X and Y at lines of the arm's own band.
 
     Unknowns are compliances, logarithms of dampers and of the masses of links and payload, in units of what is believed of them
-    (`posed.priors`). Forces are those of half an immersion, fed along the tool's x; faster cuts tell the spindle, wherever they are made.
+    (`arm_priors`). Forces are those of half an immersion, fed along the tool's x; faster cuts tell the spindle, wherever they are made.
 
     Parameters
     ----------

@@ -18,17 +18,15 @@ from rcsa_ident.base.scaleout import Map
 from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.arm.data import PosedData
 from rcsa_ident.identification.arm.misfit import PosedMisfit
-from rcsa_ident.identification.arm.modes import POSED, layout_of
-from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, pack, unpack
-from rcsa_ident.identification.arm.priors import ArmPriors
 from rcsa_ident.identification.arm.spindle_starts import drawn, spindle_of
+from rcsa_ident.identification.arm.unknowns import ArmPriors, PosedLayout, pack, posed, unpack
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.joint_fit import refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.model_order import Report, evidence, grow_modes
-from rcsa_ident.identification.parameters import Unknowns
 from rcsa_ident.identification.progress import Stage
 from rcsa_ident.identification.task import Phase, finite, perform
+from rcsa_ident.identification.unknowns import DIRECTIONS, Unknowns
 
 #: Up to which frequency a spindle is as good as rigid [Hz].
 ARM_BAND = 120.0
@@ -89,7 +87,7 @@ class DrawnSpindles:
     priors : ArmPriors
     arm : Candidate
     numbers : array, shape (d, 11)
-        As `likely_spindles.drawn` returns them.
+        As `spindle_starts.drawn` returns them.
     """
 
     phase: ClassVar[Phase] = Phase.COUPLED
@@ -128,7 +126,7 @@ class SpindleStart:
 
 def with_spindle(arm: Candidate, numbers: FloatArray) -> tuple[FloatArray, PosedLayout, FloatArray]:
     """Return where a fit begins: an arm that is known, with a drawn spindle and its joint."""
-    old = layout_of(arm.layout)
+    old = posed(arm.layout)
     spindle, joint = spindle_of(numbers)
     robot = replace(unpack(arm.theta, old), spindle=spindle)
     rest = arm.theta[old.tail :].copy()
@@ -160,7 +158,7 @@ def fit_robot(data: PosedData, priors: ArmPriors, seed: int, map: Map, report: R
     rng = np.random.default_rng(seed)
     found, misfit = _spindle(summed, priors, _arm(summed, priors, rng, map), rng, map, report)
     found, misfit = _learned(data, priors, _with_all_outputs(data, found), misfit.model_error, misfit.cut_weight, report, _WELL)
-    rival = grow_modes(found, misfit, data.base.band_hz, POSED)
+    rival = grow_modes(found, misfit, data.base.band_hz)
     report(Stage.GROW, rival.cost, rival)
     return found, misfit, rival
 
@@ -175,7 +173,7 @@ def _arm(data: PosedData, priors: ArmPriors, rng: np.random.Generator, map: Map)
     draws = np.concatenate([np.zeros((1, priors.centre.size)), rng.standard_normal((STARTS - 1, priors.centre.size))])
     rest = [
         _FIRST_RESIDUAL * np.eye(DIRECTIONS)[np.tril_indices(DIRECTIONS)],
-        np.log(priors.spindle.joint),
+        np.log(priors.joint),
         np.zeros(len(data.base.coefficient_spread)),
     ]
     starts = [ArmStart(low, priors, np.concatenate([priors.centre + draw * priors.spread, *rest])) for draw in draws]
@@ -203,7 +201,7 @@ def _grown(found: Solution, misfit: PosedMisfit, data: PosedData, report: Report
     """The solution with as many more modes as are worth it."""
     here = evidence(found, misfit)
     while True:
-        grown = grow_modes(found, misfit, data.base.band_hz, POSED)
+        grown = grow_modes(found, misfit, data.base.band_hz)
         value = evidence(grown, misfit)
         if value > here - WORTH:
             return found
@@ -213,7 +211,7 @@ def _grown(found: Solution, misfit: PosedMisfit, data: PosedData, report: Report
 
 def _with_all_outputs(data: PosedData, found: Solution) -> tuple[FloatArray, Unknowns, FloatArray]:
     """Where the fit to gap and fixture apart begins, the triggers' tooth angles among the unknowns."""
-    layout, nuisance = layout_of(found.layout), found.evaluation.nuisance
+    layout, nuisance = posed(found.layout), found.evaluation.nuisance
     angles, nuisance = tooth_angles(data.base, nuisance) if data.base.clampings else (np.zeros(0), nuisance)
     theta = np.concatenate([found.theta[: layout.force.stop], angles])
     return theta, replace(layout, clampings=angles.size), nuisance

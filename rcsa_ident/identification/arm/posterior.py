@@ -10,9 +10,9 @@ from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.identification.arm.data import SCALE
-from rcsa_ident.identification.arm.parameters import DIRECTIONS, PosedLayout, unpack
-from rcsa_ident.identification.parameters import joint_of
+from rcsa_ident.identification.arm.unknowns import PosedLayout, unpack
 from rcsa_ident.identification.posterior import steps_along
+from rcsa_ident.identification.unknowns import DIRECTIONS, joint_of
 from rcsa_ident.machine.flange_part import Doubt, JointedFlange
 from rcsa_ident.machine.robot.carried_spindle import CarriedSpindle
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
@@ -39,7 +39,7 @@ class RobotUnknowns:
     def __post_init__(self) -> None:
         object.__setattr__(self, "theta", frozen(self.theta))
         if self.theta.shape != (self.layout.size,):
-            found = f"{self.layout.size} for {self.layout.freedoms} freedoms, {self.layout.modes} modes and a joint"
+            found = f"{self.layout.size} for {self.layout.arm.freedoms} freedoms, {self.layout.modes} modes and a joint"
             raise InputError("unknowns", self.theta.size, found)
 
     @property

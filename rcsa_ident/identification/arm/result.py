@@ -11,9 +11,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark, RemarkCode
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.identification.arm.misfit import PosedMisfit
-from rcsa_ident.identification.arm.modes import layout_of
-from rcsa_ident.identification.arm.parameters import stiffening, unpack
 from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
+from rcsa_ident.identification.arm.unknowns import posed, stiffening, unpack
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.robot.model import RobotModel
@@ -74,7 +73,7 @@ class RobotIdentification(Shown):
     def springs(self) -> tuple[tuple[str, float, float, bool], ...]:
         """Name, stiffness [N m/rad], its deviation as a share, and whether the cuts tell it, of every freedom."""
         posterior = self.posterior
-        best, own = posterior.best, posterior.best.layout.compliances
+        best, own = posterior.best, posterior.best.layout.arm.parts["compliances"]
         spread, stiffness = np.sqrt(np.diag(posterior.covariance))[own], unpack(best.theta, best.layout).stiffness
         told = spread < TOLD * posterior.believed[own]
         share = spread * np.abs(stiffening(best.theta, best.layout))
@@ -85,7 +84,7 @@ class RobotIdentification(Shown):
         best = self.posterior.best.layout
         told = sum(each[3] for each in self.springs)
         return (
-            f"{self.posterior.sheet.name}, {self.status}: {told} of {best.freedoms} springs told, {best.modes} modes of the spindle, "
+            f"{self.posterior.sheet.name}, {self.status}: {told} of {best.arm.freedoms} springs told, {best.modes} modes of the spindle, "
             f"{len(self.cut_ids)} cuts at {len(self.postures)} postures"
         )
 
@@ -106,9 +105,9 @@ def answer(
     postures : array, shape (c, j) [rad]
     """
     covariance = np.linalg.inv(found.evaluation.hessian)
-    layout, data = layout_of(found.layout), misfit.data
+    layout, data = posed(found.layout), misfit.data
     own = layout.machine
-    prior = misfit.prior(layout).spread
+    prior = misfit.rows(layout).spread
     best, other = (_unknowns(each) for each in (found, rival))
     posterior = RobotPosterior(sheet, tilts, best, 0.5 * (covariance + covariance.T)[own, own], prior[own], (other,))
     chi2 = sum(found.evaluation.chi2) / misfit.points
@@ -119,7 +118,7 @@ def answer(
 
 
 def _unknowns(solution: Solution) -> RobotUnknowns:
-    layout = layout_of(solution.layout)
+    layout = posed(solution.layout)
     return RobotUnknowns(solution.theta[layout.machine], replace(layout, coefficients=0, clampings=0))
 
 

@@ -6,6 +6,7 @@ its modes, consistent with each other. Drawn ones are compared with the lines as
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,8 +14,9 @@ import scipy.linalg
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import from_hz
-from rcsa_ident.identification.arm.parameters import DIRECTIONS, SpindleParameters
 from rcsa_ident.identification.data import LEVER
+from rcsa_ident.identification.modal_parameters import ModalParameters, flange_of
+from rcsa_ident.identification.unknowns import DIRECTIONS
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment
 from rcsa_ident.tool_holder.timoshenko import beam_matrices, section
 
@@ -35,7 +37,7 @@ def drawn(count: int, rng: np.random.Generator) -> FloatArray:
     return _LEAST + (_LARGEST - _LEAST) * rng.random((count, _LEAST.size))
 
 
-def spindle_of(numbers: FloatArray) -> tuple[SpindleParameters, FloatArray]:
+def spindle_of(numbers: FloatArray) -> tuple[ModalParameters, FloatArray]:
     """Return a drawn spindle, and the logarithms of its joint's translational and rotational stiffness, shape (2,)."""
     length, front, rear, first, second = numbers[:5].tolist()
     stiff, behind, ratio, zeta = np.exp(numbers[5:9]).tolist()
@@ -45,7 +47,7 @@ def spindle_of(numbers: FloatArray) -> tuple[SpindleParameters, FloatArray]:
     psi, pull, residual = (scipy.linalg.block_diag(*(plane[k] for plane in planes)) for k in (1, 2, 3))
     damping = np.diag(np.sqrt(2.0 * zeta * omega_n))
     root = np.linalg.cholesky(residual + _LEAST_RESIDUAL * np.eye(DIRECTIONS))
-    return SpindleParameters(omega_n, psi, pull, damping, root), numbers[9:]
+    return replace(flange_of(omega_n, psi, damping, root), pull=pull), numbers[9:]
 
 
 @lru_cache(maxsize=1)

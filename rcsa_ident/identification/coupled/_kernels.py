@@ -191,7 +191,7 @@ def coupled_lines(machine, points, lines_x, lines_y):
     and p = Z^-T (Psi v + the row's share of the fixture), q = Z^-1 Psi x: d line = v^T dB x + p^T (dPsi x - dZ q) - y^T dK_joint^-1 x.
 
     The gradient's columns: log omega_n (m), psi's first four columns by rows (4 m), factor's lower triangle by rows, residual's lower
-    triangle by rows (10), with two outputs psi's last two columns by rows (2 m) and the fixture's residual (8), with softening its
+    triangle by rows (10), with two outputs of X and of Y psi's fixture column (m) and the fixture's residual (4), with softening its
     lower triangle by rows, with skew its entries above the diagonal by rows, joint (4).
     """
     omega_n, psi, factor, softening, skew, residual, fixture_residual, joint, seen = machine
@@ -314,14 +314,14 @@ def coupled_lines(machine, points, lines_x, lines_y):
                 k = _lower(row, k, complex(0.0, -w), (p, q), (lp, lq))
                 k = _lower(row, k, complex(1.0, 0.0), (v[:4], x[:4]), (rv, rx))
                 if outputs == 2:
-                    for i in range(m):
-                        row[k + axis] = fixture * q[i]
-                        row[k + 1 - axis] = 0.0
-                        k += 2
-                    for c in range(4):
-                        row[k + 4 * axis + c] = fixture * x[c]
-                        row[k + 4 * (1 - axis) + c] = 0.0
-                    k += 8
+                    for place in range(2):
+                        share = fixture if place == axis else 0.0
+                        for i in range(m):
+                            row[k] = share * q[i]
+                            k += 1
+                        for c in range(4):
+                            row[k] = share * x[c]
+                            k += 1
                 if soft:
                     for i in range(m):
                         scale = -relative * omega_n[i]

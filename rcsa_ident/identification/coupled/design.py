@@ -15,11 +15,11 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.data import CoupledData, coupled_data
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.parameters import CoupledLayout
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.experiment_design import LEAST_MODEL_ERROR, without_delay
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import CoupledLayout
 
 
 def directions_of(posterior: CoupledPosterior) -> FloatArray:

@@ -12,18 +12,14 @@ from rcsa_ident.base.scaleout import Map
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.coupled.data import CoupledData
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.modes import COUPLED
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, unpack
 from rcsa_ident.identification.coupled.score import coupled_start
 from rcsa_ident.identification.joint_fit import ROUGHLY, AxisSearch, refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.model_order import Report, drop_modes, evidence, exchange_modes, grow_modes
-from rcsa_ident.identification.parameters import Layout, Unknowns, planes
-from rcsa_ident.identification.parameters import pack as plane_pack
-from rcsa_ident.identification.parameters import unpack as plane_unpack
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
 from rcsa_ident.identification.task import Phase, finite, perform
+from rcsa_ident.identification.unknowns import CoupledLayout, Layout, Unknowns, pack, planes, unpack
 
 #: Model errors from coarse to fine: what each plane has found for itself was bent to explain the other one's forces.
 SHARES = (0.05, 0.01, 0.003)
@@ -139,8 +135,8 @@ class CoupledWalk:
             other = refine(misfit, *turned_round(found), 60, tolerance=ROUGHLY)
             if evidence(other, misfit) < evidence(found, misfit) - OTHER_SENSE:
                 found = other
-        found = drop_modes(found, misfit, steps=COUPLED)
-        found = exchange_modes(found, misfit, self.data.base.band_hz, rounds=1, steps=COUPLED)
+        found = drop_modes(found, misfit)
+        found = exchange_modes(found, misfit, self.data.base.band_hz, rounds=1)
         return CoupledSearch(found.candidate, evidence(found, misfit), misfit.model_error, misfit.cut_weight)
 
 
@@ -152,7 +148,7 @@ def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Pri
     """Return a vector with more discs than it has, the new ones so weak that nothing changes but the gradient."""
     wider = replace(layout, skew=discs)
     rng = np.random.default_rng(discs)
-    new = FIRST_SKEW * np.sqrt(priors.skew) * rng.standard_normal(wider.skew_size - layout.skew_size)
+    new = FIRST_SKEW * np.sqrt(priors.skew) * rng.standard_normal(wider.block.size - layout.block.size)
     return np.concatenate([theta[: layout.tail], new, theta[layout.tail :]]), wider
 
 
@@ -161,8 +157,8 @@ def with_softening(theta: FloatArray, layout: CoupledLayout, softening: bool) ->
     if layout.softening == softening:
         return theta, layout
     other = replace(layout, softening=softening)
-    discs = theta[layout.skews].reshape(layout.skew, 2, layout.modes)
-    return np.concatenate([pack(unpack(theta, layout), other, discs), theta[layout.tail :]]), other
+    discs = layout.block.discs(theta)
+    return np.concatenate([pack(unpack(theta, layout.block), other.block, discs), theta[layout.tail :]]), other
 
 
 def coupled_starts(
@@ -215,7 +211,7 @@ def _flange_alone(apart: Candidate) -> Apart:
     """The fit of both planes without fixture and tooth angles."""
     old, theta = planes(apart.layout), apart.theta
     layout = Layout(tuple(replace(axis, places=0) for axis in old.axes), old.coefficients)
-    parts = [plane_pack(plane_unpack(theta[old.axis(i)], old.axes[i]), axis) for i, axis in enumerate(layout.axes)]
+    parts = [pack(unpack(theta[old.axis(i)], old.axes[i]), axis) for i, axis in enumerate(layout.axes)]
     return np.concatenate([*parts, theta[old.joint], theta[old.force]]), layout, apart.nuisance
 
 
@@ -256,7 +252,7 @@ def fit_coupled(data: CoupledData, priors: Priors, best: CoupledSearch, report: 
     for _ in range(1 + ADDED):
         found, misfit = learned(start.point, misfit.model_error, misfit.cut_weight, WELL)
         # all outputs may show a mode that the flange's own motion does not
-        grown = grow_modes(found, misfit, data.base.band_hz, steps=COUPLED)
+        grown = grow_modes(found, misfit, data.base.band_hz)
         report(Stage.GROW, grown.cost, grown)
         if evidence(grown, misfit) >= evidence(found, misfit) - 1.0:
             break
@@ -268,7 +264,7 @@ def turned_round(found: Solution) -> tuple[FloatArray, CoupledLayout, FloatArray
     """Return where the search for the same machine begins whose spindle turns the other way: gyroscopic moments change their sign."""
     layout = _layout(found.layout)
     theta = found.theta.copy()
-    discs = theta[layout.skews].reshape(layout.skew, 2, layout.modes)
+    discs = layout.block.discs(theta)
     discs[:, 0] *= -1.0
     return theta, replace(layout, turning=-layout.turning), found.evaluation.nuisance
 
@@ -287,5 +283,5 @@ def _with_all_outputs(data: CoupledData, found: Candidate, priors: Priors) -> tu
     layout = replace(old, fixture=data.base.axes[0].outputs == 2, clampings=data.base.clampings)
     if not old.clampings and layout.clampings:
         angles, nuisance = tooth_angles(data.base, nuisance)
-    machine = pack(unpack(theta, old), layout, theta[old.skews].reshape(old.skew, 2, old.modes))
+    machine = pack(unpack(theta, old.block), layout.block, old.block.discs(theta))
     return np.concatenate([machine, theta[old.joint], theta[old.force], angles]), layout, nuisance

@@ -12,10 +12,10 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, damped_modes
 from rcsa_ident.dynamics.turning_modes import TurningModes
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.data import LEVER
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, lower_factor, pack, simple_axis
+from rcsa_ident.identification.modal_parameters import flange_of, lower_factor
 from rcsa_ident.identification.posterior import PlaneUnknowns, steps_along
+from rcsa_ident.identification.unknowns import JOINT, CoupledLayout, ModalBlock, joint_of, pack, unpack
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, OpenQuestion
 
 #: Directions of the flange in the order of the unknowns.
@@ -51,7 +51,7 @@ class CoupledUnknowns:
 
     def modes(self, speed: float, x: float = 0.0) -> TurningModes:
         """Return the modes at a spindle speed [rad/s] and relative speed x."""
-        machine = unpack(self.theta, self.layout).at(x)
+        machine = unpack(self.theta, self.layout.block).at(x)
         sense = -1.0 if self.layout.turning < 0 else 1.0
         skew = sense * machine.skew if machine.skew.size else np.zeros((machine.order, machine.order))
         residual = machine.residual @ machine.residual.T * np.outer(_SI, _SI)
@@ -61,21 +61,21 @@ class CoupledUnknowns:
         """Return the modes of the machine that does not turn, in both planes; its stiffness is that at relative speed x, by default the
         one at the middle of the campaign's speeds.
         """
-        machine = unpack(self.theta, self.layout).at(x)
+        machine = unpack(self.theta, self.layout.block).at(x)
         residual = machine.residual @ machine.residual.T * np.outer(_SI, _SI)
         return damped_modes(machine.omega_n, machine.factor @ machine.factor.T, machine.psi * _SI, residual, FLANGE)
 
     def seen_along(self, axis: Dof) -> PlaneUnknowns:
         """Return the modes that move one plane, as if it felt nothing of the other: where its own search may start."""
-        machine = unpack(self.theta, self.layout)
+        machine = unpack(self.theta, self.layout.block)
         own = slice(0, 2) if axis is Dof.X else slice(2, 4)
         share = np.sum(machine.psi[:, own] ** 2, axis=1) / np.maximum(np.sum(machine.psi**2, axis=1), 1e-300)
         kept = np.flatnonzero(share >= OWN_SHARE)
         if not kept.size:
             kept = np.array([int(np.argmax(share))])
         factor, residual = lower_factor(machine.factor[kept]), lower_factor(machine.residual[own])
-        alone = simple_axis(machine.omega_n[kept], machine.psi[kept, own], factor, residual)
-        return PlaneUnknowns(np.concatenate([pack(alone), self.theta[-JOINT:]]), AxisLayout(kept.size))
+        alone = flange_of(machine.omega_n[kept], machine.psi[kept, own], factor, residual)
+        return PlaneUnknowns(np.concatenate([pack(alone), self.theta[-JOINT:]]), ModalBlock(kept.size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

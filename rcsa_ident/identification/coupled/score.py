@@ -9,8 +9,8 @@ import scipy.linalg
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.parameters import DIRECTIONS, EVERY_PAIR, CoupledLayout, pack, side_by_side
-from rcsa_ident.identification.parameters import Layout, lower_triangle, unpack
+from rcsa_ident.identification.modal_parameters import side_by_side
+from rcsa_ident.identification.unknowns import DIRECTIONS, EVERY_PAIR, CoupledLayout, Layout, lower_triangle, pack, unpack
 
 #: Deviations above what chance gives, beyond which the planes are fitted together.
 STRIKES = 6.0
@@ -57,7 +57,7 @@ def coupled_start(theta: FloatArray, layout: Layout, skew: int = 0, turning: int
     fixture, softening = (all(getattr(part, name) for part in layout.axes) for name in ("places", "softening"))
     modes = sum(layout.modes_of_axes)
     coupled = CoupledLayout(modes, fixture, softening, skew, turning, layout.coefficients, layout.clampings)
-    return np.concatenate([pack(side_by_side(*axes), coupled), theta[layout.tail :]]), coupled
+    return np.concatenate([pack(side_by_side(*axes), coupled.block), theta[layout.tail :]]), coupled
 
 
 def coupling(theta: FloatArray, layout: Layout, nuisance: FloatArray, misfit: CoupledMisfit) -> Coupling:
@@ -83,9 +83,9 @@ def coupling(theta: FloatArray, layout: Layout, nuisance: FloatArray, misfit: Co
     linear = evaluation.linear
     assert linear is not None
     across, turning = _across(coupled, modes_x), np.zeros(coupled.size, dtype=bool)
-    turning[coupled.skews] = True
+    turning[coupled.block.parts["skew"]] = True
     per_point = max(sum(evaluation.chi2) / misfit.points, 1e-300)
-    prior = misfit.prior(coupled).spread
+    prior = misfit.rows(coupled).spread
 
     def score(asked: np.ndarray, known: np.ndarray) -> tuple[float, float]:
         gain, chance = _gain(linear.hessian, linear.gradient, prior, asked, known)
@@ -98,17 +98,17 @@ def coupling(theta: FloatArray, layout: Layout, nuisance: FloatArray, misfit: Co
 
 def _across(layout: CoupledLayout, modes_x: int) -> np.ndarray:
     """Which unknowns are zero for planes that feel nothing of each other, but the gyroscopic ones, shape (p,) bool."""
-    found = np.zeros(layout.size, dtype=bool)
+    found, parts = np.zeros(layout.size, dtype=bool), layout.block.parts
     of_y = np.arange(layout.modes) >= modes_x
     slope_y = np.arange(DIRECTIONS) >= DIRECTIONS // 2
-    found[layout.shapes] = (of_y[:, None] != slope_y[None, :]).ravel()
+    found[parts["shapes"]] = (of_y[:, None] != slope_y[None, :]).ravel()
     rows, cols, _ = lower_triangle(layout.modes)
-    found[layout.damping] = of_y[rows] != of_y[cols]
+    found[parts["damping"]] = of_y[rows] != of_y[cols]
     rows, cols = np.tril_indices(DIRECTIONS)
-    found[layout.residual] = slope_y[rows] != slope_y[cols]
+    found[parts["residual"]] = slope_y[rows] != slope_y[cols]
     if layout.fixture:
-        found[layout.fixture_shapes] = (of_y[:, None] != np.array([False, True])[None, :]).ravel()
-        found[layout.fixture_residual] = (np.array([False, True])[:, None] != slope_y[None, :]).ravel()
+        both = np.concatenate([of_y, slope_y])
+        found[parts["places"]] = np.concatenate([both, ~both])
     return found
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import from_rpm, to_hz, to_rpm
 from rcsa_ident.dynamics.modal import directions
-from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, parameter_names, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
+from rcsa_ident.identification.unknowns import DIRECTIONS, CoupledLayout, parameter_names, unpack
 from rcsa_ident.io.results.parts import check_covariance, matrix_of
 from rcsa_ident.io.validated_table import Table, as_number, describe
 
@@ -28,7 +28,7 @@ def both_planes_to_json(posterior: CoupledPosterior, deviation: tuple[FloatArray
         Standard deviations of the natural frequencies [rad/s] and damping ratios of the machine that does not turn.
     """
     best = posterior.best
-    standing, machine = best.standing(), unpack(best.theta, best.layout)
+    standing, machine = best.standing(), unpack(best.theta, best.layout.block)
     middle, half = posterior.speed_range
     residual = best.modes(middle).residual
     modes: list[dict[str, Any]] = [
@@ -51,7 +51,7 @@ def both_planes_to_json(posterior: CoupledPosterior, deviation: tuple[FloatArray
         "residual_compliance": residual.tolist(),
         "unknowns": best.theta.tolist(),
         "rivals": [{"layout": _layout_to_json(rival.layout), "unknowns": rival.theta.tolist()} for rival in posterior.rivals],
-        "covariance": {"parameters": list(parameter_names(best.layout)), "matrix": posterior.covariance.tolist()},
+        "covariance": {"parameters": list(parameter_names(best.layout.block)), "matrix": posterior.covariance.tolist()},
     }
 
 

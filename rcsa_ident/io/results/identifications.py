@@ -14,10 +14,10 @@ from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTe
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.machine import IdentifiedMachine, SpeedModel
-from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, workpiece_after
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.unknowns import JOINT, ModalBlock
 from rcsa_ident.io.results.axial_flanges import axial_of
 from rcsa_ident.io.results.both_planes import both_planes_from_json, both_planes_to_json
 from rcsa_ident.io.results.drawings import axis_toolings_of, axis_toolings_to_json, known_toolings_of, known_toolings_to_json
@@ -291,7 +291,7 @@ def _posterior(axis: Table, toolings: KnownToolings | None) -> Posterior | None:
     return Posterior(np.array(unknowns), matrix, layout, speed_range, rivals, **of_toolings)
 
 
-def _layout(axis: Table, size: int) -> AxisLayout:
+def _layout(axis: Table, size: int) -> ModalBlock:
     """The layout that a file says; one that says nothing holds a machine that does not change with speed."""
     if "layout" not in axis:
         found = _layout_of_size(size, False)
@@ -302,13 +302,13 @@ def _layout(axis: Table, size: int) -> AxisLayout:
     softening = table.value("softening", "true or false", False)
     if not isinstance(softening, bool):
         table.refuse("softening", describe(softening), "true or false")
-    layout = AxisLayout(table.number("modes", least=1, most=_MOST_MODES, whole=True), softening=softening)
+    layout = ModalBlock(table.number("modes", least=1, most=_MOST_MODES, whole=True), softening=softening)
     if layout.size + JOINT != size:
         axis.refuse("unknowns", f"{size} numbers", f"{layout.size + JOINT}, as {layout.modes} modes and the joint have")
     return layout
 
 
-def _rivals(axis: Table, layout: AxisLayout) -> list[FloatArray]:
+def _rivals(axis: Table, layout: ModalBlock) -> list[FloatArray]:
     """Unknowns of rival models, each of a whole number of modes."""
     allowed = "lists of numbers, each as many as a whole number of modes and the joint have"
     rows = axis.value("rivals", allowed, [])
@@ -323,6 +323,6 @@ def _rivals(axis: Table, layout: AxisLayout) -> list[FloatArray]:
     return found
 
 
-def _layout_of_size(size: int, softening: bool) -> AxisLayout | None:
-    layouts = (AxisLayout(m, softening=softening) for m in range(1, _MOST_MODES))
+def _layout_of_size(size: int, softening: bool) -> ModalBlock | None:
+    layouts = (ModalBlock(m, softening=softening) for m in range(1, _MOST_MODES))
     return next((layout for layout in layouts if layout.size + JOINT == size), None)

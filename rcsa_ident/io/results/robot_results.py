@@ -10,9 +10,9 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import to_hz
-from rcsa_ident.identification.arm.parameters import PosedLayout, unpack
 from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
 from rcsa_ident.identification.arm.result import RobotIdentification
+from rcsa_ident.identification.arm.unknowns import PosedLayout, unpack
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.results.parts import STATUSES, check_covariance, layout, matrix_of, plain, read_json
 from rcsa_ident.io.settings.robots import robot_keys, robot_of

@@ -22,8 +22,8 @@ from rcsa_ident.identification.arm.design import (
     stable_cuts,
     static_tests,
 )
-from rcsa_ident.identification.arm.priors import arm_priors
 from rcsa_ident.identification.arm.static import fit_static
+from rcsa_ident.identification.arm.unknowns import arm_priors
 from rcsa_ident.identification.experiment_design import d_optimal
 from rcsa_ident.machine.robot.compliance import static_compliance
 from rcsa_ident.machine.robot.flexible import FlexibleRobot, modes_of

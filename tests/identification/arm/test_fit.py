@@ -8,10 +8,10 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.arm.data import check_postures
 from rcsa_ident.identification.arm.misfit import PosedMisfit
-from rcsa_ident.identification.arm.parameters import PosedLayout
 from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
-from rcsa_ident.identification.arm.priors import arm_priors, posed_prior_rows
 from rcsa_ident.identification.arm.result import too_heavy_at
+from rcsa_ident.identification.arm.unknowns import PosedLayout, arm_priors
+from rcsa_ident.identification.unknowns import prior_rows
 from rcsa_ident.io.results.robot_results import read_robot_result
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
@@ -35,9 +35,9 @@ def data(arm, cuts):
 def vector(data, arm, modes=3, seed=0):
     layout = PosedLayout(tuple(arm.model.chain().stiffness.tolist()), data.masses, modes, len(data.base.coefficient_spread))
     rng = np.random.default_rng(seed)
-    theta = posed_prior_rows(layout, arm_priors(arm.model), data.base.coefficient_spread).centre + 0.2 * rng.standard_normal(layout.size)
-    theta[layout.frequencies] = np.log(2.0 * np.pi * np.linspace(150.0, 700.0, modes))
-    theta[layout.pulls] *= 0.3
+    theta = prior_rows(layout, arm_priors(arm.model), data.base.coefficient_spread).centre + 0.2 * rng.standard_normal(layout.size)
+    theta[layout.places[1]][: layout.modes] = np.log(2.0 * np.pi * np.linspace(150.0, 700.0, modes))
+    theta[layout.places[1]][layout.spindle.parts["pulls"]] *= 0.3
     return theta, layout
 
 
@@ -139,7 +139,7 @@ def test_the_result_takes_the_robots_place(told, folder, tmp_path):
     table = np.genfromtxt(out, delimiter=",", names=True)
     assert np.all(table["X_re_std"] > 0.0)
     checked = run("robot", "check", result, "--posture", posture, "--json")
-    assert checked["degrees_of_freedom"] == posterior.best.layout.freedoms
+    assert checked["degrees_of_freedom"] == posterior.best.layout.arm.freedoms
     assert checked["natural_frequencies_hz"][0] > 5.0
     refused = run("robot", "check", result, "--joints-only", code=2)
     assert "--joints-only" in refused
@@ -149,7 +149,7 @@ def test_a_spindle_that_swings_more_than_the_hand_carries_is_told(told):
     posterior = told[2]
     assert too_heavy_at(posterior, POSTURES) == 0
     theta = posterior.best.theta.copy()
-    theta[posterior.best.layout.pulls] *= 10.0
+    theta[posterior.best.layout.places[1]][posterior.best.layout.spindle.parts["pulls"]] *= 10.0
     heavy = replace(posterior, best=replace(posterior.best, theta=theta))
     assert too_heavy_at(heavy, POSTURES) == len(POSTURES)
 

@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.coupled.parameters import EVERY_PAIR, CoupledLayout
-from rcsa_ident.identification.parameters import DAMPING_UNIT
+from rcsa_ident.identification.unknowns import DAMPING_UNIT, EVERY_PAIR, CoupledLayout
 
 #: Every way in which the unknowns of three modes may be written down.
 LAYOUTS = [
@@ -31,17 +30,17 @@ def coupled_vector(layout, seed=1):
     rng = np.random.default_rng(seed)
     theta, m = np.zeros(layout.size), layout.modes
     theta[:m] = rng.permutation(np.log(2.0 * np.pi * np.geomspace(600.0, 3400.0, m)))
-    theta[layout.shapes] = rng.choice([-1.0, 1.0], 4 * m) * rng.uniform(0.1, 0.5, 4 * m)
+    theta[layout.block.parts["shapes"]] = rng.choice([-1.0, 1.0], 4 * m) * rng.uniform(0.1, 0.5, 4 * m)
     rows, cols = np.tril_indices(m)
     own = np.log(2.0 * 0.05 * np.exp(theta[:m])) / 2.0 - np.log(DAMPING_UNIT)
-    theta[layout.damping] = np.where(rows == cols, own[rows], 0.3 * rng.standard_normal(rows.size))
+    theta[layout.block.parts["damping"]] = np.where(rows == cols, own[rows], 0.3 * rng.standard_normal(rows.size))
     rows, cols = np.tril_indices(4)
-    theta[layout.residual] = np.where(rows == cols, 1.0, 0.0) + 0.2 * rng.standard_normal(rows.size)
-    theta[layout.fixture_shapes] = 0.1 * rng.standard_normal(2 * m * layout.fixture)
-    theta[layout.fixture_residual] = 0.3 * rng.standard_normal(8 * layout.fixture)
-    theta[layout.softenings] = 0.1 / m * rng.standard_normal(layout.pairs * layout.softening)
+    theta[layout.block.parts["residual"]] = np.where(rows == cols, 1.0, 0.0) + 0.2 * rng.standard_normal(rows.size)
+    beside = np.hstack([0.1 * rng.standard_normal((layout.block.places, m)), 0.3 * rng.standard_normal((layout.block.places, 4))])
+    theta[layout.block.parts["places"]] = beside.ravel()
+    theta[layout.block.parts["softening"]] = 0.1 / m * rng.standard_normal(layout.block.pairs * layout.softening)
     spread = 0.2 if layout.skew == EVERY_PAIR else np.sqrt(0.2)
-    theta[layout.skews] = spread * rng.standard_normal(layout.skew_size)
+    theta[layout.block.parts["skew"]] = spread * rng.standard_normal(layout.tail - layout.block.parts["skew"].start)
     theta[layout.joint] = np.log([2e9, 5e6, 1e3, 10.0])
     theta[layout.force] = 0.05 * rng.standard_normal(layout.coefficients)
     theta[layout.clamping] = rng.uniform(-1.0, 1.0, layout.clampings)
@@ -56,8 +55,10 @@ def dense_receptance(machine, omega, x=0.0, speed=0.0):
     damping = machine.factor @ machine.factor.T
     if machine.skew.size:
         damping = damping + speed * machine.skew
-    psi = np.hstack([machine.psi, machine.fixture])
-    static = np.vstack([machine.residual @ machine.residual.T, machine.fixture_residual])
+    # a machine whose fixture is no output of its own has one that stands still
+    still = 2 - machine.places.shape[1]
+    psi = np.hstack([machine.psi, np.pad(machine.places, ((0, 0), (0, still)))])
+    static = np.vstack([machine.residual @ machine.residual.T, np.pad(machine.place_residual, ((0, still), (0, 0)))])
     unit = np.eye(machine.order)
     found = [psi.T @ np.linalg.solve(stiffness - w**2 * unit + 1j * w * damping, machine.psi) for w in np.atleast_1d(omega)]
     return np.array(found) + static
@@ -68,7 +69,7 @@ def dense_lines(machine, joint, points, seen=((0.0, 0.0), (0.0, 0.0))):
 
     Parameters
     ----------
-    machine : CoupledParameters
+    machine : ModalParameters
     joint : array, shape (4,)
         k_t, k_r, c_t, c_r, the rotational ones over the lever squared.
     points : PointArrays

@@ -11,7 +11,6 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification import evidence as method_module
 from rcsa_ident.identification.coupled import fit
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.coupled.score import STRIKES
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.levenberg_marquardt import Solution
@@ -19,6 +18,7 @@ from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
+from rcsa_ident.identification.unknowns import CoupledLayout, unpack
 from tests.fixtures.kept import kept
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, oblique, open_shop
 from tests.identification.coupled.models import coupled_vector
@@ -294,9 +294,9 @@ def test_turned_round_it_is_the_same_vector_again():
     found = Solution(theta, layout, Evaluated(), True, 1)
     turned, other, nuisance = fit.turned_round(found)
     assert other == replace(layout, turning=-1)
-    np.testing.assert_array_equal(unpack(turned, other).skew, -unpack(theta, layout).skew)
+    np.testing.assert_array_equal(unpack(turned, other.block).skew, -unpack(theta, layout.block).skew)
     rest = np.ones(theta.size, dtype=bool)
-    rest[layout.skews] = False
+    rest[layout.block.parts["skew"]] = False
     np.testing.assert_array_equal(turned[rest], theta[rest])
     assert nuisance is Evaluated.nuisance
     back, again, _ = fit.turned_round(replace(found, theta=turned, layout=other))

@@ -1,5 +1,6 @@
 """The kernel of both planes against dense solutions and other roads; these tests run again without the compiler."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -19,18 +20,20 @@ from rcsa_ident.identification.coupled._kernels import (
     coupled_lines,
     posed_lines,
 )
-from rcsa_ident.identification.coupled.parameters import (
+from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
+from rcsa_ident.identification.data import LEVER
+from rcsa_ident.identification.modal_parameters import ModalParameters, side_by_side
+from rcsa_ident.identification.unknowns import (
     EVERY_PAIR,
     CoupledLayout,
-    CoupledParameters,
-    side_by_side,
+    Layout,
+    ModalBlock,
+    joint_of,
+    scaled_joint,
     strict_triangle,
     unpack,
 )
-from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
-from rcsa_ident.identification.data import LEVER
-from rcsa_ident.identification.parameters import AxisLayout, Layout, joint_of, scaled_joint
-from rcsa_ident.identification.parameters import unpack as unpack_axis
+from rcsa_ident.identification.unknowns import unpack as unpack_axis
 from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
@@ -63,12 +66,12 @@ def points(count=7, seed=3, symmetric=False):
 
 def machine_of(layout, seed=1):
     theta = coupled_vector(layout, seed)
-    return unpack(theta, layout), scaled_joint(theta[layout.joint])
+    return unpack(theta, layout.block), scaled_joint(theta[layout.joint])
 
 
 def arrays(machine, joint, seen=NOTHING):
-    psi = np.hstack([machine.psi, machine.fixture])
-    skew, fixture_residual = machine.skew, machine.fixture_residual
+    psi = np.hstack([machine.psi, machine.places])
+    skew, fixture_residual = machine.skew, machine.place_residual
     return MachineArrays(machine.omega_n, psi, machine.factor, machine.softening, skew, machine.residual, fixture_residual, joint, seen)
 
 
@@ -116,7 +119,7 @@ def test_light_damping_and_strong_moments_need_no_pivoting():
     machine, joint = machine_of(CoupledLayout(6, skew=EVERY_PAIR))
     light = 1e-3 * machine.factor
     at = points(7)._replace(omega=np.append(machine.omega_n, 9000.0))
-    machine = CoupledParameters(*(light if name == "factor" else getattr(machine, name) for name in CoupledParameters.__slots__))
+    machine = replace(machine, factor=light)
     for lines, truth in zip(fill(machine, joint, at, 1), expected_lines(machine, joint, at, 1), strict=True):
         np.testing.assert_allclose(lines.parts, truth, rtol=1e-7, atol=1e-8 * np.abs(truth).max())
 
@@ -125,7 +128,7 @@ def shifted(machine, joint, k, step, outputs):
     """The machine with the unknown of a column of the gradient moved; frequencies by a share."""
     m, lower = machine.order, np.tril_indices(machine.order)
     parts = [machine.omega_n.copy(), machine.psi.copy(), machine.factor[lower], machine.residual[np.tril_indices(4)]]
-    parts += [machine.fixture.copy(), machine.fixture_residual.copy()] if outputs == 2 else []
+    parts += [np.hstack([machine.places.T, machine.place_residual])] if outputs == 2 else []
     parts += [machine.softening[lower]] if machine.softening.size else []
     parts += [machine.skew[strict_triangle(m)]] if machine.skew.size else []
     parts.append(joint.copy())
@@ -138,9 +141,10 @@ def shifted(machine, joint, k, step, outputs):
     factor, residual, softening, skew = np.zeros((m, m)), np.zeros((4, 4)), machine.softening, machine.skew
     factor[lower], residual[np.tril_indices(4)] = parts[2], parts[3]
     rest = parts[4:-1]
-    fixture, fixture_residual = machine.fixture, machine.fixture_residual
+    fixture, fixture_residual = machine.places, machine.place_residual
     if outputs == 2:
-        fixture, fixture_residual, *rest = rest
+        beside, *rest = rest
+        fixture, fixture_residual = beside[:, :m].T, beside[:, m:]
     if softening.size:
         softening = np.zeros((m, m))
         softening[lower] = rest.pop(0)
@@ -149,7 +153,7 @@ def shifted(machine, joint, k, step, outputs):
         skew = np.zeros((m, m))
         skew[strict_triangle(m)] = rest.pop(0)
         skew = skew - skew.T
-    return CoupledParameters(parts[0], parts[1], factor, residual, fixture, fixture_residual, softening, skew), parts[-1]
+    return ModalParameters(parts[0], parts[1], factor, residual, fixture, fixture_residual, softening, skew=skew), parts[-1]
 
 
 def sizes(machine, joint, outputs):
@@ -157,7 +161,7 @@ def sizes(machine, joint, outputs):
     m = machine.order
     pairs = m * (m + 1) // 2
     parts = [np.ones(m), np.full(4 * m, 0.3), np.full(pairs, 10.0), np.full(10, 3e-5)]
-    parts += [np.full(2 * m, 0.1), np.full(8, 1e-9)] if outputs == 2 else []
+    parts += [*[np.full(m, 0.1), np.full(4, 1e-9)] * 2] if outputs == 2 else []
     parts += [np.full(pairs, 0.1)] if machine.softening.size else []
     parts += [np.full(m * (m - 1) // 2, 0.2)] if machine.skew.size else []
     return np.concatenate([*parts, joint])
@@ -209,10 +213,10 @@ def test_a_change_of_the_flange_moves_a_line_by_what_it_feels(outputs, seen):
     for r in np.vstack([np.eye(4), [[1.0, -0.5, 2.0, 0.3]]]):
         step = 1e-5 * np.trace(static)
         ahead, behind = (
-            CoupledParameters(
+            ModalParameters(
                 *(
                     np.linalg.cholesky(static + sign * step * np.outer(r, r)) if name == "residual" else getattr(machine, name)
-                    for name in CoupledParameters.__slots__
+                    for name in ModalParameters.__slots__
                 )
             )
             for sign in (1.0, -1.0)
@@ -227,7 +231,7 @@ def test_a_change_of_the_flange_moves_a_line_by_what_it_feels(outputs, seen):
 @pytest.mark.parametrize("softening", [False, True])
 @pytest.mark.parametrize("outputs", [1, 2])
 def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(outputs, softening):
-    layout = Layout((AxisLayout(3, outputs - 1, softening), AxisLayout(2, outputs - 1, softening)))
+    layout = Layout((ModalBlock(3, outputs - 1, softening), ModalBlock(2, outputs - 1, softening)))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     joint = scaled_joint(theta[layout.joint])
     at = points(9, symmetric=True)
@@ -289,7 +293,7 @@ def test_lines_are_those_of_a_turning_tool_holder_on_turning_modes(sense):
     place = np.stack([np.arange(4)] * 2, axis=1)
     force = np.tile(np.array([30.0 + 10.0j, -20.0 + 5.0j]), (4, 1))
     at = PointArrays(omega, np.full(4, x), np.full(4, speed), place, flange, tip, force)
-    for i, lines in enumerate(fill(unpack(theta, layout), scaled_joint(joint), at, 1)):
+    for i, lines in enumerate(fill(unpack(theta, layout.block), scaled_joint(joint), at, 1)):
         expected = whole[:, 2 * i, [0, 2]] * force
         np.testing.assert_allclose(lines.parts[:, 0], expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
 

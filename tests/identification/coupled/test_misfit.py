@@ -7,12 +7,11 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled._kernels import PointArrays
 from rcsa_ident.identification.coupled.data import coupled_data
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.parameters import EVERY_PAIR, CoupledLayout, unpack
 from rcsa_ident.identification.coupled.score import coupled_start
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout, scaled_joint
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.rough_data import with_distances
+from rcsa_ident.identification.unknowns import EVERY_PAIR, CoupledLayout, Layout, ModalBlock, scaled_joint, unpack
 from tests.identification.coupled.models import LAYOUTS, coupled_vector, dense_lines, named
 from tests.identification.models import vector_of
 from tests.identification.test_misfit import dense, flat
@@ -57,7 +56,7 @@ def test_models_from_their_definition(tables, layout):
         points.omega, points.relative_speed, points.speed, points.place, points.flange[turning], points.tip[turning], points.force
     )
     seen = [misfit.seen_at(i, theta, layout) for i in range(2)]
-    both = dense_lines(unpack(theta, layout), scaled_joint(theta[layout.joint]), rows, seen)
+    both = dense_lines(unpack(theta, layout.block), scaled_joint(theta[layout.joint]), rows, seen)
     force = points.force * np.exp(points.slope @ scales[:named_ones])
     moved = np.einsum("paof,pf->pao", both, force)
     for i, (axis, model) in enumerate(zip(data.axes, misfit.models(theta, layout), strict=True)):
@@ -117,7 +116,7 @@ def test_two_planes_side_by_side_are_what_each_is_alone(tables, fixture):
     """Where nothing is felt across, and tool-holders are asked as if they stood, the model is that of `Misfit`."""
     points = tables[2 if fixture else 1]
     data = points.base
-    layout = Layout((AxisLayout(3, int(fixture), True), AxisLayout(2, int(fixture), True)), len(data.coefficient_spread), data.clampings)
+    layout = Layout((ModalBlock(3, int(fixture), True), ModalBlock(2, int(fixture), True)), len(data.coefficient_spread), data.clampings)
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     apart = Misfit(data, Priors(), SHARES).models(theta, layout)
     for skew in (0, EVERY_PAIR):
@@ -131,12 +130,12 @@ def test_compliance_is_the_change_with_the_flange(tables):
     """What a new mode's promise is made of: d residual / d the flange's receptance, its upper triangle by rows."""
     misfit, layout, theta = case(tables, CoupledLayout(3, True, True, 1, 1))
     here = misfit.evaluate(theta, layout, np.zeros((len(misfit.data.cut_ids), 2)), normal=True)
-    factor = unpack(theta, layout).residual
+    factor = unpack(theta, layout.block).residual
     rows, cols = np.triu_indices(4)
     for k in range(10):
         step = np.zeros(theta.size)
-        step[layout.residual.start + k] = 1e-4
-        ahead, behind = (unpack(theta + sign * step, layout).residual for sign in (1.0, -1.0))
+        step[layout.block.parts["residual"].start + k] = 1e-4
+        ahead, behind = (unpack(theta + sign * step, layout.block).residual for sign in (1.0, -1.0))
         change = ((ahead @ ahead.T - behind @ behind.T) / 2e-4)[rows, cols]
         models = [misfit.models(theta + sign * step, layout) for sign in (1.0, -1.0)]
         for i in range(2):

@@ -6,11 +6,10 @@ import pytest
 from rcsa_ident.identification.coupled.data import coupled_data
 from rcsa_ident.identification.coupled.fit import with_discs, with_softening
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.modes import COUPLED, selected, with_mode
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, unpack
 from rcsa_ident.identification.levenberg_marquardt import refine
-from rcsa_ident.identification.model_order import exchange_modes
+from rcsa_ident.identification.model_order import exchange_modes, fewer, more
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import CoupledLayout, pack, unpack
 from tests.identification.coupled.models import coupled_vector, dense_receptance
 
 OMEGA = 2.0 * np.pi * np.geomspace(300.0, 4500.0, 30)
@@ -18,27 +17,27 @@ LAYOUT = CoupledLayout(5, fixture=True, softening=True, skew=2, turning=1)
 
 
 def machine():
-    return unpack(coupled_vector(LAYOUT), LAYOUT)
+    return unpack(coupled_vector(LAYOUT), LAYOUT.block)
 
 
 def test_some_modes_are_the_machine_without_the_others():
     """Their damping and moments as they were: what is left out is only their own motion."""
     kept = np.array([True, False, True, True, False])
     whole = machine()
-    few = selected(whole, kept)
+    few = whole.selected(kept)
     np.testing.assert_allclose(few.factor @ few.factor.T, (whole.factor @ whole.factor.T)[np.ix_(kept, kept)], rtol=1e-9, atol=1e-9)
     for name in ("softening", "skew"):
         np.testing.assert_array_equal(getattr(few, name), getattr(whole, name)[np.ix_(kept, kept)])
-    for name in ("omega_n", "psi", "fixture"):
+    for name in ("omega_n", "psi", "places"):
         np.testing.assert_array_equal(getattr(few, name), getattr(whole, name)[kept])
-    none = selected(replace(whole, softening=np.zeros((0, 0)), skew=np.zeros((0, 0))), kept)
+    none = replace(whole, softening=np.zeros((0, 0)), skew=np.zeros((0, 0))).selected(kept)
     assert none.softening.size == none.skew.size == 0
 
 
 def test_one_mode_more_adds_its_own_receptance():
     whole, shape = machine(), np.array([0.3, -0.2, 0.1, 0.4])
     omega_n, zeta = 9000.0, 0.03
-    more = with_mode(whole, omega_n, shape, zeta)
+    more = whole.with_mode(omega_n, shape, zeta)
     for x, speed in ((0.0, 0.0), (0.5, 1500.0)):
         difference = dense_receptance(more, OMEGA, x, speed) - dense_receptance(whole, OMEGA, x, speed)
         own = np.outer(shape, shape) / (omega_n**2 - OMEGA**2 + 2j * zeta * omega_n * OMEGA)[:, None, None]
@@ -55,7 +54,7 @@ def test_more_discs_are_next_to_nothing_but_have_a_gradient():
     assert grown.size == wider.size
     np.testing.assert_array_equal(grown[: layout.tail], theta[: layout.tail])
     np.testing.assert_array_equal(grown[wider.tail :], theta[layout.tail :])
-    change = unpack(grown, wider).skew - unpack(theta, layout).skew
+    change = unpack(grown, wider.block).skew - unpack(theta, layout.block).skew
     assert 0.0 < np.abs(change).max() < 0.05
     again, _ = with_discs(theta, layout, 2, Priors())
     np.testing.assert_array_equal(again, grown)
@@ -66,10 +65,10 @@ def test_softening_comes_with_nothing_and_goes_alone():
     theta = coupled_vector(layout)
     softer, wider = with_softening(theta, layout, True)
     assert wider == replace(layout, softening=True)
-    one, other = unpack(theta, layout), unpack(softer, wider)
+    one, other = unpack(theta, layout.block), unpack(softer, wider.block)
     np.testing.assert_array_equal(other.softening, np.zeros((4, 4)))
     np.testing.assert_array_equal(other.skew, one.skew)
-    np.testing.assert_array_equal(other.fixture, one.fixture)
+    np.testing.assert_array_equal(other.places, one.places)
     same, again = with_softening(softer, wider, False)
     assert again == layout
     np.testing.assert_allclose(same, theta, rtol=1e-12)
@@ -99,8 +98,8 @@ def missing(plain):
     without = np.argsort(theta[:5])[2]
     kept = np.arange(5) != without
     few = replace(layout, modes=4)
-    discs = theta[layout.skews].reshape(1, 2, 5)[:, :, kept]
-    start = np.concatenate([pack(selected(unpack(theta, layout), kept), few, discs), theta[layout.tail :]])
+    discs = layout.block.discs(theta)[:, :, kept]
+    start = np.concatenate([pack(unpack(theta, layout.block).selected(kept), few.block, discs), theta[layout.tail :]])
     solution = refine(misfit, start, few, np.zeros((len(points.base.cut_ids), 2)), 30, grid=32)
     band = float(min(a.omega.min() for a in points.base.axes)) / 2.0 / np.pi, float(points.omega.max()) / 2.0 / np.pi
     return misfit, solution, band, np.exp(theta[without])
@@ -109,17 +108,17 @@ def missing(plain):
 @pytest.mark.slow
 def test_the_missing_mode_is_promised_and_found(missing):
     misfit, solution, band, omega_n = missing
-    trials = COUPLED.more(solution, misfit, 0, band)
+    trials = more(solution, misfit, 0, band)
     assert {layout for _, layout in trials} == {replace(solution.layout, modes=5)}
     assert all(theta.size == layout.size for theta, layout in trials)
     places = np.exp([theta[0] for theta, _ in trials])
     assert np.abs(np.log(places / omega_n)).min() < 0.2
     # the others are what they were, their discs too
     for theta, layout in trials:
-        old, new = unpack(solution.theta, solution.layout), unpack(theta, layout)
+        old, new = unpack(solution.theta, solution.layout.block), unpack(theta, layout.block)
         np.testing.assert_allclose(new.skew[1:, 1:], old.skew, rtol=1e-12)
         assert not new.skew[0].any()
-    found = exchange_modes(solution, misfit, band, rounds=1, steps=COUPLED)
+    found = exchange_modes(solution, misfit, band, rounds=1)
     assert found.cost < 0.2 * solution.cost
     assert found.layout.modes == 5
 
@@ -128,11 +127,10 @@ def test_the_missing_mode_is_promised_and_found(missing):
 def test_fewer_modes_keep_what_is_shared(missing):
     misfit, solution, _, _ = missing
     del misfit
-    trials = COUPLED.fewer(solution, 1)
+    trials = fewer(solution, 1)
     assert len(trials) >= 4
     for theta, layout in trials:
         assert layout == replace(solution.layout, modes=3)
         np.testing.assert_array_equal(theta[layout.tail :], solution.theta[solution.layout.tail :])
     # two of a plane are the fewest
-    assert COUPLED.fewer(solution, 2) == []
-    assert COUPLED.groups(solution.layout) == 1
+    assert fewer(solution, 2) == []

@@ -7,10 +7,9 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.receptance import dissipation
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.identification.data import LEVER
-from rcsa_ident.identification.parameters import JOINT
+from rcsa_ident.identification.unknowns import JOINT, CoupledLayout, unpack
 from rcsa_ident.tool_holder.turning import turning_receptance
 from tests.identification.coupled.models import coupled_vector, dense_receptance
 
@@ -104,7 +103,7 @@ def test_machine_at_a_speed(speed, x, sense):
     known = posterior(layout=layout)
     found = known.candidate(known.best, speed)
     turning = SPEEDS[0] if speed is None else speed
-    expected = dense_receptance(unpack(known.best.theta, layout), OMEGA, x, turning)[:, :4]
+    expected = dense_receptance(unpack(known.best.theta, layout.block), OMEGA, x, turning)[:, :4]
     values = found.flange.receptance(OMEGA).values
     np.testing.assert_allclose(values * np.outer(SCALE, SCALE), expected, atol=1e-8 * np.abs(expected).max())
     # what tool-holders are told
@@ -122,7 +121,7 @@ def test_a_campaign_at_one_speed_says_nothing_of_others():
 
 def test_standing_modes_are_the_machine_that_does_not_turn():
     best = unknowns()
-    expected = dense_receptance(unpack(best.theta, LAYOUT), OMEGA)[:, :4]
+    expected = dense_receptance(unpack(best.theta, LAYOUT.block), OMEGA)[:, :4]
     found = best.standing().receptance(OMEGA).values * np.outer(SCALE, SCALE)
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 

@@ -7,12 +7,11 @@ import pytest
 
 from rcsa_ident.identification.coupled.data import coupled_data
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.parameters import EVERY_PAIR
 from rcsa_ident.identification.coupled.score import STRIKES, Coupling, coupled_start, coupling
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.unknowns import EVERY_PAIR, Layout, ModalBlock
 from tests.identification.coupled.models import some_missing
 from tests.identification.models import vector_of
 from tests.identification.test_misfit import dense, flat
@@ -33,13 +32,13 @@ def across(theta, layout):
     vector, whole = coupled_start(theta, layout, EVERY_PAIR)
     zero = vector == 0.0
     turning = np.zeros(vector.size, dtype=bool)
-    turning[whole.skews] = True
+    turning[whole.block.parts["skew"]] = True
     return vector, whole, zero & ~turning, turning
 
 
 def case(data, seed, change=0.0, kind=None):
     """Lines of planes that feel `change` of each other, and the optimum of planes that feel nothing, with the noise that is there."""
-    layout = Layout((AxisLayout(3), AxisLayout(2)))
+    layout = Layout((ModalBlock(3), ModalBlock(2)))
     theta = vector_of(layout, FREQUENCIES)
     vector, whole, oblique, turning = across(theta, layout)
     rng = np.random.default_rng(seed)
@@ -118,7 +117,7 @@ def test_gain_is_that_of_one_step_of_least_squares(all_cuts):
 
 
 def test_the_start_is_the_same_machine():
-    layout = Layout((AxisLayout(3, 1, True), AxisLayout(2, 1, True)), 3, 2)
+    layout = Layout((ModalBlock(3, 1, True), ModalBlock(2, 1, True)), 3, 2)
     theta = vector_of(layout, FREQUENCIES)
     vector, whole, oblique, turning = across(theta, layout)
     # everything that is not felt across is there once, in some place
@@ -126,7 +125,7 @@ def test_the_start_is_the_same_machine():
     assert (whole.modes, whole.fixture, whole.softening, whole.coefficients, whole.clampings) == (5, True, True, 3, 2)
     np.testing.assert_array_equal(vector[whole.tail :], theta[layout.tail :])
     # one axis that does not change with speed, or has no fixture, leaves the whole without
-    fewer = replace(layout, axes=(AxisLayout(3, 1), AxisLayout(2, 0, True)))
+    fewer = replace(layout, axes=(ModalBlock(3, 1), ModalBlock(2, 0, True)))
     _, whole = coupled_start(vector_of(fewer, FREQUENCIES), fewer)
     assert not whole.fixture
     assert not whole.softening

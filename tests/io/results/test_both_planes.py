@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.coupled.parameters import CoupledLayout
 from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
+from rcsa_ident.identification.unknowns import CoupledLayout
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json, speed_band_to_json
 from rcsa_ident.io.results.parts import plain, read_result, write_result
 from rcsa_ident.workflows.identify import mode_deviations

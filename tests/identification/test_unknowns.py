@@ -8,30 +8,27 @@ from hypothesis import strategies as st
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.data import LEVER
-from rcsa_ident.identification.parameters import (
+from rcsa_ident.identification.modal_parameters import flange_modes
+from rcsa_ident.identification.unknowns import (
     DAMPING_UNIT,
     JOINT,
-    AxisLayout,
     Layout,
+    ModalBlock,
     chain,
     flange_layout,
-    flange_modes,
     joint_of,
     pack,
     parameter_names,
     scaled_joint,
-    selected,
     split,
     unpack,
-    with_mode,
-    without_mode,
 )
 
 
 @st.composite
 def vectors(draw, softening=None):
     """Any machine that the priors do not find absurd, and many that they do; softening as small as machines have it."""
-    layout = AxisLayout(draw(st.integers(1, 6)), draw(st.integers(0, 2)), draw(st.booleans()) if softening is None else softening)
+    layout = ModalBlock(draw(st.integers(1, 6)), draw(st.integers(0, 2)), draw(st.booleans()) if softening is None else softening)
     m = layout.modes
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     part = rng.standard_normal(layout.size) * draw(st.sampled_from([0.1, 1.0, 2.0]))
@@ -109,7 +106,7 @@ def test_another_speed_is_the_same_equations(drawn, x):
 
 
 def test_a_stiffness_that_would_turn_negative_does_not():
-    layout = AxisLayout(2, softening=True)
+    layout = ModalBlock(2, softening=True)
     part = np.zeros(layout.size)
     part[:2] = np.log(2.0 * np.pi * np.array([300.0, 900.0]))
     part[-3:] = [-0.5, 0.0, 0.2]
@@ -119,11 +116,11 @@ def test_a_stiffness_that_would_turn_negative_does_not():
 
 
 def test_overdamped_modes_are_real_poles():
-    part = np.zeros(AxisLayout(2).size)
+    part = np.zeros(ModalBlock(2).size)
     part[:2] = np.log(2.0 * np.pi * np.array([300.0, 900.0]))
     part[2:6] = [1.0, 0.3, -0.5, 1.0]
     part[6:9] = np.log(100.0), 20.0, np.log(90.0)  # damping ratios above 1
-    axis = unpack(part, AxisLayout(2))
+    axis = unpack(part, ModalBlock(2))
     modes = flange_modes(axis, Dof.Y)
     omega = 2.0 * np.pi * np.linspace(10.0, 3000.0, 50)
     np.testing.assert_allclose(modes.receptance(omega).values, receptance(axis, omega)[:, :2, :2], rtol=1e-7)
@@ -131,7 +128,7 @@ def test_overdamped_modes_are_real_poles():
     assert dissipation(omega, modes.receptance(omega).values).min() > -1e-9
 
 
-@pytest.mark.parametrize("layout", [AxisLayout(3), AxisLayout(3, 1), AxisLayout(2, 2, True)])
+@pytest.mark.parametrize("layout", [ModalBlock(3), ModalBlock(3, 1), ModalBlock(2, 2, True)])
 def test_chain_is_the_derivative(layout):
     rng = np.random.default_rng(2)
     m = layout.modes
@@ -163,7 +160,7 @@ def test_without_mode_keeps_the_others(drawn, which):
     m = layout.modes
     axis = unpack(part, layout)
     kept = np.arange(m) != which % m
-    left = without_mode(axis, which % m)
+    left = axis.without_mode(which % m)
     np.testing.assert_array_equal(left.omega_n, axis.omega_n[kept])
     np.testing.assert_array_equal(left.psi, axis.psi[kept])
     np.testing.assert_array_equal(left.places, axis.places[kept])
@@ -184,23 +181,23 @@ def test_with_mode_adds_its_own_receptance(drawn, hertz, zeta, x):
     axis = unpack(part, layout)
     psi, omega_n = np.array([0.4, -0.2]), 2.0 * np.pi * hertz
     omega = 2.0 * np.pi * np.geomspace(30.0, 9000.0, 40)
-    more = with_mode(axis, omega_n, tuple(psi), zeta)
+    more = axis.with_mode(omega_n, tuple(psi), zeta)
     fraction = 1.0 / (omega_n**2 - omega**2 + 2j * zeta * omega_n * omega)
     expected = receptance(axis, omega, x)
     lever = np.array([1.0, 1.0 / LEVER])
     expected[:, :2, :2] += np.outer(psi * lever, psi * lever) * fraction[:, None, None]
     assert np.abs(receptance(more, omega, x) - expected).max() < 1e-9 * np.abs(expected).max()
     # and it goes again without a trace
-    back = without_mode(more, 0)
+    back = more.without_mode(0)
     assert np.abs(receptance(back, omega, x) - receptance(axis, omega, x)).max() < 1e-9 * np.abs(expected).max()
 
 
 def test_without_mode_of_hardly_any_damping():
     # the damping's product has long lost these to rounding: its Cholesky factor does not exist
-    part = np.zeros(AxisLayout(3).size)
+    part = np.zeros(ModalBlock(3).size)
     part[:3] = np.log(2.0 * np.pi * np.array([300.0, 900.0, 2000.0]))
     part[9:15] = [-30.0, 2.0, -40.0, 2.0, 0.0, -50.0]
-    left = without_mode(unpack(part, AxisLayout(3)), 0)
+    left = unpack(part, ModalBlock(3)).without_mode(0)
     assert np.all(np.isfinite(pack(left)))
     np.testing.assert_allclose(left.factor @ left.factor.T, DAMPING_UNIT**2 * np.array([[4.0, 4.0], [4.0, 4.0]]), rtol=1e-6)
 
@@ -212,7 +209,7 @@ def test_selected_in_another_order_is_the_same_machine(drawn, seed, x):
     axis = unpack(part, layout)
     order = np.random.default_rng(seed).permutation(layout.modes)
     omega = 2.0 * np.pi * np.geomspace(30.0, 9000.0, 40)
-    turned = selected(axis, order)
+    turned = axis.selected(order)
     expected = receptance(axis, omega, x)
     assert np.abs(receptance(turned, omega, x) - expected).max() < 1e-9 * np.abs(expected).max()
     np.testing.assert_array_equal(turned.omega_n, axis.omega_n[order])
@@ -220,7 +217,7 @@ def test_selected_in_another_order_is_the_same_machine(drawn, seed, x):
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.lists(st.builds(AxisLayout, st.integers(1, 5), st.booleans(), st.booleans()), min_size=1, max_size=3),
+    st.lists(st.builds(ModalBlock, st.integers(1, 5), st.booleans(), st.booleans()), min_size=1, max_size=3),
     st.integers(0, 9),
     st.integers(0, 3),
 )
@@ -242,7 +239,7 @@ def test_every_unknown_has_one_place(axes, coefficients, clampings):
 
 
 def test_plain_layout():
-    assert flange_layout(2, 3) == Layout((AxisLayout(2), AxisLayout(3)))
+    assert flange_layout(2, 3) == Layout((ModalBlock(2), ModalBlock(3)))
     assert flange_layout(4).size == 4 + 8 + 10 + 3 + 4
 
 
@@ -257,7 +254,7 @@ def test_joint():
 
 
 def test_names_follow_the_vector():
-    layout = AxisLayout(2, places=1, softening=True)
+    layout = ModalBlock(2, places=1, softening=True)
     names = parameter_names(layout)
     assert names[:6] == (
         "log natural_frequency_rad_s[0]",

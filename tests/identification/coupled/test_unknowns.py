@@ -7,45 +7,48 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.dynamics.receptance import dissipation
-from rcsa_ident.identification.coupled.parameters import (
+from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
+from rcsa_ident.identification.data import LEVER
+from rcsa_ident.identification.modal_parameters import side_by_side
+from rcsa_ident.identification.unknowns import (
+    DAMPING_UNIT,
     EVERY_PAIR,
+    JOINT,
+    PLACE_UNIT,
+    RESIDUAL_UNIT,
     CoupledLayout,
+    Layout,
+    ModalBlock,
     chain,
     pack,
     parameter_names,
-    side_by_side,
-    skew_chain,
     strict_triangle,
     unpack,
 )
-from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
-from rcsa_ident.identification.data import LEVER
-from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, PLACE_UNIT, RESIDUAL_UNIT, AxisLayout, Layout
-from rcsa_ident.identification.parameters import unpack as unpack_axis
+from rcsa_ident.identification.unknowns import unpack as unpack_axis
 from tests.identification.coupled.models import LAYOUTS, coupled_vector, dense_receptance, named
 from tests.identification.models import vector_of
-from tests.identification.test_parameters import receptance
+from tests.identification.test_unknowns import receptance
 
 OMEGA = 2.0 * np.pi * np.geomspace(200.0, 5000.0, 40)
 every_layout = pytest.mark.parametrize("layout", LAYOUTS, ids=named)
 
 
 def discs_of(theta, layout):
-    return theta[layout.skews].reshape(layout.skew, 2, layout.modes) if layout.skew > 0 else None
+    return layout.block.discs(theta) if layout.skew > 0 else None
 
 
 @every_layout
 def test_vector_and_physics_belong_together(layout):
     theta = coupled_vector(layout)
-    packed = pack(unpack(theta, layout), layout, discs_of(theta, layout))
+    packed = pack(unpack(theta, layout.block), layout.block, discs_of(theta, layout))
     np.testing.assert_allclose(packed, theta[: layout.tail], rtol=1e-13, atol=1e-13)
 
 
 @every_layout
 def test_every_place_of_the_vector_has_one_meaning(layout):
     layout = replace(layout, coefficients=3, clampings=2)
-    names = ("shapes", "damping", "residual", "fixture_shapes", "fixture_residual", "softenings", "skews", "joint", "force", "clamping")
-    places = [np.arange(layout.modes), *(np.arange(layout.size)[getattr(layout, name)] for name in names)]
+    places = [np.arange(layout.size)[place] for place in (*layout.block.parts.values(), layout.joint, layout.force, layout.clamping)]
     np.testing.assert_array_equal(np.concatenate(places), np.arange(layout.size))
     assert layout.tail == layout.joint.start
     assert layout.axis(0) == layout.axis(1) == slice(0, layout.tail)
@@ -55,11 +58,11 @@ def test_every_place_of_the_vector_has_one_meaning(layout):
 @every_layout
 def test_the_flange_is_a_vector_of_its_own(layout):
     theta = coupled_vector(replace(layout, coefficients=3, clampings=2))
-    whole, flange = unpack(theta, layout), unpack(theta[layout.machine], layout.flange)
-    assert layout.machine.size + JOINT == layout.flange.size
+    whole, flange = unpack(theta, layout.block), unpack(theta[layout.block.machine], layout.flange.block)
+    assert layout.block.machine.size + JOINT == layout.flange.size
     for name in ("omega_n", "psi", "factor", "residual", "softening", "skew"):
         np.testing.assert_array_equal(getattr(flange, name), getattr(whole, name))
-    assert not flange.fixture.any()
+    assert not flange.places.size
 
 
 def entry(machine, discs, name):
@@ -87,7 +90,7 @@ def entry(machine, discs, name):
 def test_names_say_what_stands_there(layout):
     layout = layout.flange
     theta = coupled_vector(layout)
-    machine, names = unpack(theta, layout), parameter_names(layout)
+    machine, names = unpack(theta, layout.block), parameter_names(layout.block)
     assert len(names) == len(set(names)) == layout.size
     for name, value in zip(names[:-JOINT], theta, strict=False):
         expected = np.exp(value) if name.startswith("log ") else value
@@ -97,10 +100,10 @@ def test_names_say_what_stands_there(layout):
 
 def physics(theta, layout):
     """In the order of the kernel's columns; frequencies as logarithms, the gyroscopic coupling above the diagonal."""
-    machine = unpack(theta, layout)
+    machine = unpack(theta, layout.block)
     lower = np.tril_indices(layout.modes)
     parts = [np.log(machine.omega_n), machine.psi.ravel(), machine.factor[lower], machine.residual[np.tril_indices(4)]]
-    parts += [machine.fixture.ravel(), machine.fixture_residual.ravel()] if layout.fixture else []
+    parts.append(np.hstack([machine.places.T, machine.place_residual]).ravel())
     parts += [machine.softening[lower]] if layout.softening else []
     parts += [machine.skew[strict_triangle(layout.modes)]] if layout.skew else []
     return np.concatenate(parts)
@@ -115,10 +118,10 @@ def test_chain_against_differences(layout):
         step[k] = 1e-6
         expected[:, k] = (physics(theta + step, layout) - physics(theta - step, layout)) / 2e-6
     found = np.zeros_like(expected)
-    plain = layout.skews.start
-    found[:plain, :plain] = np.diag(chain(unpack(theta, layout), layout)[:plain])
+    plain = layout.block.parts["skew"].start
+    found[:plain, :plain] = np.diag(chain(unpack(theta, layout.block), layout.block)[:plain])
     if layout.skew:
-        found[plain:, plain:] = skew_chain(theta, layout)
+        found[plain:, plain:] = layout.block.skew_chain(theta)
     units = np.abs(expected).max(axis=1, keepdims=True)
     np.testing.assert_allclose(found / units, expected / units, atol=1e-8)
 
@@ -126,11 +129,11 @@ def test_chain_against_differences(layout):
 def test_gyroscopic_coupling_of_discs_is_skew_and_of_low_rank():
     for discs in (1, 2):
         layout = CoupledLayout(6, skew=discs)
-        skew = unpack(coupled_vector(layout), layout).skew
+        skew = unpack(coupled_vector(layout), layout.block).skew
         np.testing.assert_array_equal(skew, -skew.T)
         assert np.linalg.matrix_rank(skew) == 2 * discs
     layout = CoupledLayout(6, skew=EVERY_PAIR)
-    assert np.linalg.matrix_rank(unpack(coupled_vector(layout), layout).skew) == 6
+    assert np.linalg.matrix_rank(unpack(coupled_vector(layout), layout.block).skew) == 6
 
 
 def test_one_more_disc_leaves_the_first():
@@ -138,13 +141,13 @@ def test_one_more_disc_leaves_the_first():
     one, two = CoupledLayout(4, skew=1), CoupledLayout(4, skew=2)
     theta = coupled_vector(one)
     grown = np.concatenate([theta[: one.tail], np.zeros(8)])
-    np.testing.assert_array_equal(unpack(grown, two).skew, unpack(theta, one).skew)
+    np.testing.assert_array_equal(unpack(grown, two.block).skew, unpack(theta, one.block).skew)
 
 
 @pytest.mark.parametrize("fixture", [False, True])
 @pytest.mark.parametrize("softening", [False, True])
 def test_side_by_side_are_both_planes_receptances(fixture, softening):
-    layout = Layout((AxisLayout(3, int(fixture), softening), AxisLayout(2, int(fixture), softening)))
+    layout = Layout((ModalBlock(3, int(fixture), softening), ModalBlock(2, int(fixture), softening)))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     planes = [unpack_axis(theta[layout.axis(i)], part) for i, part in enumerate(layout.axes)]
     lever = np.array([1.0, LEVER])
@@ -164,7 +167,7 @@ def test_side_by_side_are_both_planes_receptances(fixture, softening):
 
 @every_layout
 def test_machine_at_a_speed_is_the_direct_solution(layout):
-    machine = unpack(coupled_vector(layout), layout)
+    machine = unpack(coupled_vector(layout), layout.block)
     for x, speed in ((0.0, 1000.0), (-1.0, 800.0), (1.0, 2000.0), (0.4, -1500.0)):
         there = machine.at(x)
         assert there.softening.size == 0
@@ -207,7 +210,7 @@ def test_a_spindle_that_turns_the_other_way(sense):
     modes = CoupledUnknowns(theta, layout).modes(1500.0)
     assert modes.speed == sense * 1500.0
     scale = np.array([1.0, LEVER, 1.0, LEVER])
-    expected = dense_receptance(unpack(theta, layout), OMEGA, 0.0, 1500.0)[:, :4]
+    expected = dense_receptance(unpack(theta, layout.block), OMEGA, 0.0, 1500.0)[:, :4]
     found = modes.receptance(OMEGA).values * np.outer(scale, scale)
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
@@ -215,4 +218,5 @@ def test_a_spindle_that_turns_the_other_way(sense):
 def test_fixture_residual_has_its_unit():
     layout = CoupledLayout(2, fixture=True)
     theta = coupled_vector(layout)
-    np.testing.assert_allclose(unpack(theta, layout).fixture_residual.ravel(), PLACE_UNIT * theta[layout.fixture_residual])
+    found = unpack(theta, layout.block).place_residual
+    np.testing.assert_allclose(found, PLACE_UNIT * theta[layout.block.parts["places"]].reshape(2, -1)[:, 2:])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.identification.arm.parameters import PosedLayout, chain, pack, share_of, stiffening, unknown_of, unpack
 from rcsa_ident.identification.arm.posterior import RobotPosterior, RobotUnknowns
-from rcsa_ident.identification.arm.priors import arm_priors, posed_prior_rows
 from rcsa_ident.identification.arm.spindle_starts import drawn, spindle_of
+from rcsa_ident.identification.arm.unknowns import PosedLayout, arm_priors, chain, pack, share_of, stiffening, unknown_of, unpack
+from rcsa_ident.identification.unknowns import prior_rows
 from tests.fixtures.robots import robot
 
 LAYOUT = PosedLayout(tuple(robot("tx200").chain().stiffness.tolist()), 7, 3, 2, 1)
@@ -15,9 +15,7 @@ LAYOUT = PosedLayout(tuple(robot("tx200").chain().stiffness.tolist()), 7, 3, 2, 
 
 def vector(seed=0, layout=LAYOUT):
     rng = np.random.default_rng(seed)
-    return posed_prior_rows(layout, arm_priors(robot("tx200")), (0.05,) * layout.coefficients).centre + 0.3 * rng.standard_normal(
-        layout.size
-    )
+    return prior_rows(layout, arm_priors(robot("tx200")), (0.05,) * layout.coefficients).centre + 0.3 * rng.standard_normal(layout.size)
 
 
 def test_unpacked_and_packed_again():
@@ -32,14 +30,15 @@ def test_compliances_stay_above_nothing_and_add_up_where_they_are_large():
     np.testing.assert_allclose(unknown_of(share), unknown, atol=1e-9)
     np.testing.assert_allclose(share[unknown > 2.0], unknown[unknown > 2.0], rtol=1e-3)
     # what is believed is the data sheet's own
-    at_sheet = unpack(posed_prior_rows(LAYOUT, arm_priors(robot("tx200")), (0.05, 0.05)).centre, LAYOUT)
+    at_sheet = unpack(prior_rows(LAYOUT, arm_priors(robot("tx200")), (0.05, 0.05)).centre, LAYOUT)
     np.testing.assert_allclose(at_sheet.stiffness, LAYOUT.springs, rtol=1e-12)
 
 
 def test_slopes_of_physics():
     theta, step = vector(1), 1e-6
     slopes, logs = chain(unpack(theta, LAYOUT), theta, LAYOUT), stiffening(theta, LAYOUT)
-    for k in (*range(0, 2 * LAYOUT.freedoms + LAYOUT.masses + LAYOUT.modes, 5), LAYOUT.factor.start, LAYOUT.residual.start + 2):
+    first, parts = LAYOUT.arm.size, LAYOUT.spindle.parts
+    for k in (*range(0, first + LAYOUT.modes, 5), first + parts["damping"].start, first + parts["residual"].start + 2):
         moved = theta.copy()
         moved[k] += step
         here, there = (unpack(each, LAYOUT) for each in (theta, moved))
@@ -50,7 +49,7 @@ def test_slopes_of_physics():
         ]  # fmt: skip
         largest = max((c[np.argmax(np.abs(c))] for c in change), key=abs) / step
         assert largest == pytest.approx(slopes[k], rel=1e-4)
-        if k < LAYOUT.freedoms:
+        if k < LAYOUT.arm.freedoms:
             assert np.log(there.stiffness[k] / here.stiffness[k]) / step == pytest.approx(logs[k], rel=1e-4)
 
 
@@ -77,9 +76,9 @@ def test_draws_scatter_as_the_covariance_has_it():
     model = robot("kr210")
     springs = tuple(model.chain().stiffness.tolist())
     layout = PosedLayout(springs, len(model.joints))
-    centre = posed_prior_rows(layout, arm_priors(model)).centre
+    centre = prior_rows(layout, arm_priors(model)).centre
     sizes = np.zeros(layout.size)
-    sizes[layout.compliances], sizes[layout.weights] = 0.05, 0.02
+    sizes[layout.arm.parts["compliances"]], sizes[layout.arm.parts["masses"]] = 0.05, 0.02
     posterior = RobotPosterior(model, True, RobotUnknowns(centre, layout), np.diag(sizes**2), np.ones(layout.size))
     arms = posterior.draws(400, np.random.default_rng(3))
     compliance = np.array([springs / each.model.chain().stiffness for each in arms])
