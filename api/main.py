@@ -29,6 +29,7 @@ from api.routes import (
     dropped_files,
     example_campaign,
     examples,
+    fields,
     forces,
     health,
     holders,
@@ -163,6 +164,7 @@ def create_app(
         holders,
         materials,
         schemas,
+        fields,
         examples,
         example_campaign,
     )

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import ConfigDict, Field, StringConstraints
 
-from api.schemas.common import CORRECTION, Answer, Body, CorrectionName, EngagementRows, Fault, Line
+from api.schemas.common import Answer, Body, Declared, EngagementRows, Fault, Keys
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
-from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.signals.recording import Quantity, Role, Sensor
+from rcsa_ident.io.settings.setups import sensor_of_keys
+from rcsa_ident.setup.fields import CAMPAIGN, CUT, HAMMER_TEST, RECORDINGS, SENSOR, WORKPIECE
+from rcsa_ident.signals.recording import Sensor
 
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
 
@@ -40,66 +40,27 @@ EXAMPLE: dict[str, Any] = {
     ],
 }
 
+#: What a query of forces does not ask of a sensor.
+_UNHEARD = ("gain_spread_percent", "cross_talk_percent", "delay_spread_us")
 
-class HeadKeys(Body):
+
+class HeadKeys(Keys, fields=CAMPAIGN):
     """[campaign]"""
 
-    name: Line | None = None
-    sampling_rate_hz: float | None = Field(None, description="For files without a sampling rate.")
-    clock_error_percent: float | None = Field(
-        None, ge=-2.0, le=2.0, description="By how much the recorder's clock runs fast: it takes that many more samples in a second."
-    )
-    axial_depth_spread_mm: float | None = Field(None, description="Standard deviation of the depth, common to a tooling's cuts; 0.02.")
-    speed_softening_percent: float | None = Field(
-        None, description="Standard deviation of the stiffness's change from the middle of the speeds to their end."
-    )
+    clock_error_percent: Annotated[float, Field(ge=-2.0, le=2.0)] | None = None
 
 
-class SensorKeys(Body):
+class SensorKeys(Keys, fields=SENSOR, limits=True):
     """A sensor as [sensors.CHANNEL] of campaign.toml; the key is the channel's name in the recordings."""
 
-    quantity: Literal["displacement", "acceleration", "trigger", "force"]
-    axis: Literal["X", "Y", "Z"] | None = None
-    sensitivity: float | None = Field(
-        None, ge=-1e12, le=1e12, description="Signal per quantity: V/m, V/(m/s^2), V/N; 1 where the file is in SI."
-    )
-    delay_s: float | None = Field(None, ge=-1.0, le=1.0)
-    bandwidth_hz: float | None = Field(None, gt=0.0)
-    role: Literal["spindle", "fixture", "table", "workpiece"] | None = Field(None, description="What an accelerometer is fixed to.")
-    mount_resonance_hz: float | None = Field(None, gt=0.0, description="Of the sensor on its mount, a magnet or wax.")
-    rotation_deg: float | None = Field(
-        None, ge=-180.0, le=180.0, description="Of what the sensor measures from its axis, about the spindle's, from +X towards +Y."
-    )
-    pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
-    tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
-    gain_spread_percent: float | None = Field(None, description="Standard deviation of the gain; 2. Counts where drawings are rough.")
-    cross_talk_percent: float | None = Field(None, description="Standard deviation of what it feels of the other axis; 1.5.")
-    delay_spread_us: float | None = Field(None, description="Standard deviation of its delay; 5.")
-    distance_behind_flange_mm: float | None = Field(
-        None,
-        ge=-100.0,
-        le=300.0,
-        description="How far a displacement sensor looks behind the face between holder and spindle; negative: at the holder.",
-    )
-    distance_spread_mm: float | None = Field(None, ge=0.0, le=100.0, description="Standard deviation of that distance; 1.")
+    sensitivity: Annotated[float, Field(ge=-1e12, le=1e12)] | None = None
+    gain_spread_percent: float | None = None
+    cross_talk_percent: float | None = None
+    delay_spread_us: float | None = None
 
     def sensor(self, name: str) -> Sensor:
-        """Return the sensor of a channel."""
-        return Sensor(
-            name,
-            Quantity(self.quantity),
-            None if self.axis is None else Dof(self.axis.lower()),
-            1.0 if self.sensitivity is None else self.sensitivity,
-            0.0 if self.delay_s is None else self.delay_s,
-            self.bandwidth_hz,
-            1 if self.pulses_per_revolution is None else self.pulses_per_revolution,
-            None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg),
-            None if self.role is None else Role(self.role),
-            self.mount_resonance_hz,
-            0.0 if self.rotation_deg is None else math.radians(self.rotation_deg),
-            distance=None if self.distance_behind_flange_mm is None else 1e-3 * self.distance_behind_flange_mm,
-            distance_spread=1e-3 * (1.0 if self.distance_spread_mm is None else self.distance_spread_mm),
-        )
+        """Return the sensor of a channel; how well it is known counts in identifications only."""
+        return sensor_of_keys(name, {key: value for key, value in dict(self).items() if key not in _UNHEARD})
 
 
 def given_sensors(keys: Mapping[str, SensorKeys] | None) -> tuple[Sensor, ...]:
@@ -107,72 +68,36 @@ def given_sensors(keys: Mapping[str, SensorKeys] | None) -> tuple[Sensor, ...]:
     return tuple(each.sensor(name) for name, each in (keys or {}).items())
 
 
-class WorkpieceKeys(Body):
+class WorkpieceKeys(Keys, fields=WORKPIECE):
     """[workpiece]"""
 
     name: Text
-    tangential_coefficient_mpa: float
-    radial_ratio: float
-    axial_ratio: float | None = None
-    tangential_edge_n_per_mm: float | None = None
-    radial_edge_n_per_mm: float | None = None
-    axial_edge_n_per_mm: float | None = None
-    tangential_coefficient_spread_percent: float | None = None
-    radial_ratio_spread_percent: float | None = None
-    edge_spread_percent: float | None = None
-    edge_force_spread_n_per_mm: float | None = Field(None, description="Standard deviation of edge forces that nobody tells; 10.")
 
 
-class CutConditions(BaseModel):
+class CutConditions(Declared, fields=CUT):
     """What a cut was: how its cutter was engaged is told by angles, a radial depth, a block's sides, or a map."""
 
     id: Text
     tooling: Text
-    spindle_speed_rpm: float
-    spindle_speed_to_rpm: float | None = Field(None, description="At which a pass ends whose speed changes evenly; null keeps the speed.")
-    axial_depth_mm: float
-    feed_per_tooth_mm: float
-    entry_angle_deg: float | None = Field(None, description="At the cutter's diameter; with a shape, down and up milling are stepovers.")
-    exit_angle_deg: float | None = None
-    radial_depth_mm: float | None = Field(None, description="With strategy, instead of the angles.")
-    strategy: Literal["up", "down"] | None = None
-    stock: Literal["stepover", "block"] | None = Field(None, description="What stood around the cutter.")
-    y_from_mm: float | None = Field(None, description="Of a block: its sides beside the cutter's path, along the normal direction.")
-    y_to_mm: float | None = None
-    engagement: EngagementRows | None = Field(None, description="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up.")
-    lead_deg: float | None = Field(None, description="By which the tool leans in the direction of the feed, with engagement.")
-    tilt_deg: float | None = None
-    feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
-    posture_deg: list[float] | None = Field(None, description="Of a robot's joints; an identification of the robot asks for it.")
-    started: str | None = Field(None, description="When the recording began, as 2026-11-27T08:15:00.")
-    temperature_c: float | None = Field(None, description="Near the spindle's bearings.")
-    validation: bool | None = Field(None, description="The cut is predicted, and nothing is learned from it.")
+    engagement: EngagementRows | None = None
+    feed_direction: str | float
+    started: str | None = None
 
 
-class CutKeys(Body, CutConditions):
+class CutKeys(Keys, CutConditions, fields=RECORDINGS):
     """[[cuts]]"""
 
-    cut: FileName = Field(description="Recording of the cut; only the last part of a path counts, and its suffix is the format.")
-    air: FileName | None = Field(None, description="Recording at the same speed without cutting; may serve several cuts.")
+    cut: FileName
+    air: FileName | None = None
 
 
-class HammerTestKeys(Body):
+class HammerTestKeys(Keys, fields=HAMMER_TEST):
     """[[frfs]]"""
 
     id: Text
     tooling: Text
-    axis: Literal["X", "Y"]
-    response: Literal["tip", "flange"] | float = Field(description="tip, flange (the machine's side of it), or mm from the tip.")
-    force: Literal["tip", "flange"] | float = Field(description="As response; one of the two is a point of tool or holder.")
-    file: FileName = Field(description="File of the FRF; only the last part of a path counts, and its content says what it is.")
-    record: int | None = Field(None, description="Which of several FRFs in the file.")
-    units: str | None = Field(None, description="Of a file that tells none: a motion over a force, such as um/N.")
-    standstill: bool | None = None
-    sensor_mass_g: float | None = None
-    from_hz: float | None = None
-    to_hz: float | None = None
-    error_percent: float | None = Field(None, description="By how much each line may be wrong beside its noise; 2 if left out.")
-    correction: CorrectionName | None = Field(None, description=CORRECTION)
+    file: FileName
+    units: str | None = None
 
 
 class NewCampaign(Body):

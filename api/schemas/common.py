@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 
 from rcsa_ident.base.plausibility import Range
+from rcsa_ident.setup.fields import NEEDED, Many, Named, Number
+from rcsa_ident.setup.fields import Field as Key
 
 #: Names given by users: no paths, no control characters.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._+()-]{0,63}$"
@@ -16,9 +20,6 @@ Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 #: Free text without control characters, which not every database accepts.
 Line = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
-#: What is done to a measured FRF, as `rcsa_ident.dynamics.passivity.Correction` names it.
-CorrectionName = Literal["auto", "none", "reverse", "conjugate", "conjugate-reverse", "exchange", "exchange-reverse"]
-CORRECTION = "Of a reversed sensor or hammer, of time as e^(-iωt), of exchanged columns; auto turns what is certain and says so."
 #: Rows of a map of engagement, each a height and two angles.
 EngagementRows = Annotated[list[Annotated[list[float], Field(min_length=3, max_length=3)]], Field(min_length=1, max_length=1000)]
 #: Keys of a body or of a part of it, and items of one key.
@@ -48,6 +49,59 @@ class Body(BaseModel):
                 if isinstance(value, list | dict) and len(value) > MOST_ITEMS:
                     raise ValueError(f"at most {MOST_ITEMS} items are allowed, found {len(value)} in {str(key)[:80]}")
         return data
+
+
+def _kind_of(field: Key, limits: bool) -> Any:
+    """The type of what stands under a key."""
+    match field.kind:
+        case Many(most=most):
+            return Annotated[list[_number(field, limits)], Field(max_length=most)]  # type: ignore[misc]
+        case Named(names=names):
+            return Literal[names] | _number(field, limits)
+        case tuple() as choices:
+            return Literal[choices]
+        case type() as kind:
+            return Line if kind is str else kind
+        case _:
+            return _number(field, limits)
+
+
+def _number(field: Key, limits: bool) -> Any:
+    number = field.number
+    if not limits or not isinstance(number, Number):
+        return int if isinstance(number, Number) and number.whole else float
+    return Annotated[int if number.whole else float, Field(ge=number.least, gt=number.above, le=number.most)]
+
+
+class Declared(BaseModel):
+    """Declared keys; a class types or limits some of them otherwise, where bodies tell something else than files.
+
+    Parameters
+    ----------
+    fields : sequence of Field
+    limits : bool
+        Whether limits of plain numbers are held to here; else whoever reads the keys does that.
+    defaults : bool
+        Whether a key that is left out is what counts then; else it is null.
+    """
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any: ...
+
+    def __init_subclass__(cls, fields: Sequence[Key] = (), limits: bool = False, defaults: bool = False) -> None:
+        own, cls.__annotations__ = dict(cls.__annotations__), {}
+        for each in fields:
+            usual = each.default if defaults or each.default is NEEDED else None
+            usual = vars(cls).get(each.key, ... if usual is NEEDED else usual)
+            kind = _kind_of(each, limits)
+            cls.__annotations__[each.key] = own.pop(each.key, kind | None if usual is None else kind)
+            setattr(cls, each.key, usual if isinstance(usual, FieldInfo) else Field(usual, description=each.described or None))
+        cls.__annotations__ |= own
+
+
+class Keys(Body, Declared):
+    """A body of declared keys."""
 
 
 class Answer(BaseModel):

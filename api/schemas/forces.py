@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, StringConstraints
 
 from api.schemas.campaigns import SensorKeys
 from api.schemas.common import Answer, Body, Id, Line
-from api.schemas.queries import Angle, Depth, Percent, Tooling, Turn
+from api.schemas.queries import Depth, Percent, Tooling
 from api.schemas.toolings import EXAMPLE
 from api.work.forces import ForceQuestion, WornQuestion
 from rcsa_ident.base.errors import InputError
@@ -32,6 +32,8 @@ Sensors = Annotated[
     dict[Line, SensorKeys] | None,
     Field(min_length=1, max_length=MOST_CHANNELS, description="Sensors by channel; null: those of the machine's identification."),
 ]
+Angle = Annotated[float, Field(ge=0.0, le=180.0)]
+Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
 class WornCut(Body):

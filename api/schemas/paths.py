@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from api.schemas.common import Answer, Body, Line
+from api.schemas.common import Answer, Body, Keys
 from api.schemas.jobs import JobAnswer
 from api.schemas.queries import OnMachine, OnRobot, Rpm, Tooling
 from api.schemas.robot_queries import Coordinate
@@ -15,34 +15,20 @@ from api.work.paths import PathRequest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.stock import Immersion
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec, asked_cut
+from rcsa_ident.setup.fields import COEFFICIENTS, OF_MATERIAL
 from rcsa_ident.stability.methods import MethodName
 
 Millimetre = Annotated[float, Field(ge=1e-6, le=100.0)]
 _SHOWN: dict[str, Any] = {"tooling": EXAMPLE, "block_mm": [0.0, 0.0, -20.0, 60.0, 40.0, 0.0]}
 
 
-class PathCut(Body):
+class PathCut(Keys, fields=(OF_MATERIAL, *COEFFICIENTS)):
     """Coefficients of the material; those that are not given are the identification's workpiece's. What else a cut is the path says."""
-
-    material: Annotated[Line | None, Field(description="Of the library of materials.")] = None
-    ktc_mpa: float | None = None
-    krc: float | None = None
-    kac: float | None = None
-    kte_n_per_mm: float | None = None
-    kre_n_per_mm: float | None = None
 
     def spec(self) -> CutSpec:
         """Return the cut in SI."""
-        values = (
-            ("tangential", self.ktc_mpa, 1e6), ("radial_ratio", self.krc, 1.0), ("axial_ratio", self.kac, 1.0),
-            ("tangential_edge", self.kte_n_per_mm, 1e3), ("radial_edge", self.kre_n_per_mm, 1e3),
-        )  # fmt: skip
-        return CutSpec(
-            engagement=Immersion(0.5, "down"),
-            material=self.material,
-            coefficients={name: value * unit for name, value, unit in values if value is not None},
-        )
+        return asked_cut(Immersion(0.5, "down"), 0.0, dict(self))
 
 
 class RemovalQuery(Body):

@@ -9,31 +9,24 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from api.schemas.common import Answer, Body, EngagementRows, Id, Line, Name, within
+from api.schemas.common import Answer, Body, EngagementRows, Id, Keys, Name, within
 from api.schemas.machines import Curve
 from api.schemas.robots import Posed
 from api.schemas.tips import TappedTip
 from api.schemas.toolings import EXAMPLE, ToolingKeys
 from api.work.requests import AdviceRequest, LobeRequest, TipRequest
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, INDENTATION, POWER, RUNOUT, SIDE, SPINDLE_SPEED, TORQUE, WEAR_LAND
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, POWER, SPINDLE_SPEED, TORQUE
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.conditions import Block, Engagement
-from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion
 from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 from rcsa_ident.io.settings.engagements import engagement_map_of
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec, asked_cut
+from rcsa_ident.setup.fields import ASKED_CUT
 from rcsa_ident.stability.methods import MethodName
 
 MOST_TOOLINGS, MOST_SPEEDS, MOST_TESTED = 12, 5000, 1000
-Angle = Annotated[float, Field(ge=0.0, le=180.0)]
-Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
-Micrometre = Annotated[float, within(RUNOUT)]
-Side = Annotated[float, within(SIDE)]
-Lean = Annotated[float, Field(ge=-89.0, le=89.0)]
-Land = Annotated[float, within(WEAR_LAND)]
-Pressure = Annotated[float, within(INDENTATION)]
 Percent = Annotated[float, Field(ge=0.0, le=50.0)]
 Rpm = Annotated[float, within(SPINDLE_SPEED)]
 Hertz = Annotated[float, Field(ge=1.0, le=20_000.0)]
@@ -83,35 +76,12 @@ class TipAnswer(Answer):
     spindle_speed_rpm: float | None = Field(None, description="At which they hold; null where they do not change with it.")
 
 
-class Cut(Body):
+class Cut(Keys, fields=ASKED_CUT, limits=True, defaults=True):
     """What cuts, and how; coefficients that are not given are those of the identification's workpiece."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"immersion": 0.5, "strategy": "down"}]})
 
-    immersion: Annotated[float, Field(ge=0.001, le=1.0, description="Radial depth over diameter; 1 is a slot.")] = 0.5
-    strategy: Literal["up", "down"] = "down"
-    entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
-    exit_deg: Angle | None = None
-    stock: Annotated[
-        Literal["stepover", "block"] | None,
-        Field(description="What stands around the cutter: a stepover of the immersion, as where the same cutter cut before, or a block."),
-    ] = None
-    y_from_mm: Annotated[Side | None, Field(description="Of a block: its sides beside the path, along the normal direction.")] = None
-    y_to_mm: Side | None = None
-    engagement: Annotated[EngagementRows | None, Field(description="Rows of z_mm, entry_angle_deg, exit_angle_deg from the tip up.")] = None
-    lead_deg: Annotated[Lean | None, Field(description="By which the tool leans towards the feed, with engagement.")] = None
-    feed_direction: Annotated[Literal["+X", "-X", "+Y", "-Y"] | Turn, Field(description="Or degrees from +X.")] = "+X"
-    feed_per_tooth_mm: float | None = None
-    material: Annotated[Line | None, Field(description="Of the library of materials.")] = None
-    ktc_mpa: float | None = None
-    krc: float | None = None
-    kac: float | None = None
-    kte_n_per_mm: float | None = None
-    kre_n_per_mm: float | None = None
-    runout_um: Annotated[list[Micrometre] | None, Field(max_length=100, description="Radial offset of each edge.")] = None
-    wear_land_um: Annotated[Land | None, Field(description="Process damping, with indentation.")] = None
-    indentation: Annotated[Pressure | None, Field(description="[N/m^3], 1e14 for aluminium.")] = None
-    friction: Annotated[float, Field(ge=0.0, le=2.0)] = 0.3
+    engagement: EngagementRows | None = None
 
     def spec(self) -> CutSpec:
         """Return the cut in SI."""
@@ -122,22 +92,7 @@ class Cut(Body):
             raise InputError(f"cut.{missing}", "nothing", "wear_land_um and indentation, or neither")
         direction = self.feed_direction
         angle = FEED_DIRECTIONS[direction] if isinstance(direction, str) else math.radians(direction)
-        values = (
-            ("tangential", self.ktc_mpa, 1e6), ("radial_ratio", self.krc, 1.0), ("axial_ratio", self.kac, 1.0),
-            ("tangential_edge", self.kte_n_per_mm, 1e3), ("radial_edge", self.kre_n_per_mm, 1e3),
-        )  # fmt: skip
-        damping = None
-        if self.wear_land_um is not None and self.indentation is not None:
-            damping = ProcessDamping(self.indentation, self.wear_land_um * 1e-6, self.friction)
-        return CutSpec(
-            self._engagement(),
-            float(angle),
-            None if self.feed_per_tooth_mm is None else self.feed_per_tooth_mm * 1e-3,
-            self.material,
-            {name: value * unit for name, value, unit in values if value is not None},
-            None if self.runout_um is None else tuple(offset * 1e-6 for offset in self.runout_um),
-            damping,
-        )
+        return asked_cut(self._engagement(), float(angle), dict(self))
 
     def _engagement(self) -> AskedEngagement:
         told = {

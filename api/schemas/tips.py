@@ -6,8 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
 
-from api.schemas.common import CORRECTION, Body, CorrectionName
+from api.schemas.common import Body
 from api.schemas.toolings import CutterKeys, Text
+from rcsa_ident.setup.fields import CORRECTION, CORRECTIONS
 
 #: Direct and cross FRFs along three axes.
 MOST_FRFS = 9
@@ -22,7 +23,7 @@ class TapTest(Body):
     text: FrfText = Field(description="FRF.csv, a universal file in text, or text columns of frequency [Hz], real and imaginary part.")
     axes: Directions | None = Field(None, description="Axis of response and force, XY where it is pushed along Y; null: as the text says.")
     record: Annotated[int, Field(ge=1, le=100_000)] | None = Field(None, description="Which of several, counted from 1.")
-    correction: CorrectionName = Field("auto", description=CORRECTION)
+    correction: Literal[CORRECTIONS] = Field("auto", description=CORRECTION)  # type: ignore[valid-type]
 
 
 class TappedTip(Body):

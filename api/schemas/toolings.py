@@ -6,13 +6,15 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, StringConstraints
 
-from api.schemas.common import Answer, Body, Line
+from api.schemas.common import Answer, Body, Keys, Line
 from rcsa_ident.cutting.serration import WaveShape
-from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.settings.cutters import MOST_POINTS
+from rcsa_ident.setup.fields import CONTACT, CUTTER, MATERIAL, SEGMENT, SPREAD
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 MOST_SEGMENTS, MOST_TEETH = 200, 100
+Offsets = Annotated[list[float], Field(max_length=MOST_TEETH)]
+Points = Annotated[list[Annotated[list[float], Field(min_length=2, max_length=3)]], Field(max_length=MOST_POINTS)]
 
 EXAMPLE: dict[str, Any] = {
     "name": "S1-ER32",
@@ -41,48 +43,24 @@ class SerrationKeys(Body):
     table: list[float] | None = Field(None, max_length=MOST_POINTS)
 
 
-class CutterKeys(Body):
+class CutterKeys(Keys, fields=CUTTER):
     """[cutter]"""
 
-    teeth: int
-    diameter_mm: float
-    helix_deg: float | Annotated[list[float], Field(max_length=MOST_TEETH)] = Field(0.0, description="One angle, or one a tooth.")
-    helix_kind: Text | None = Field(None, description="lead, or angle where the edge stands at one angle to the axis at any radius.")
-    pitch_deg: list[float] | None = Field(None, max_length=MOST_TEETH)
-    shape: Text | None = Field(
-        None, description=f"One of {', '.join(CutterShape)}; flat without it. Without the keys that draw it, it is computed as a cylinder."
-    )
-    corner_radius_mm: float | None = None
-    cutting_edge_angle_deg: float | None = Field(None, description="KAPR, from the floor to the edge.")
-    taper_deg: float | None = Field(None, description="From the axis to the edge.")
-    largest_diameter_mm: float | None = Field(None, description="DCX, where the edge ends.")
-    cutting_depth_mm: float | None = Field(None, description="APMX, from the tip to where the edge ends.")
-    wiper_mm: float | None = Field(None, description="BS, length of the flat beside the corner.")
-    profile_radius_mm: float | None = Field(None, description="PRFRAD, of the long arc.")
-    axial_distance_mm: float | None = Field(None, description="From the tip to where a barrel is widest.")
-    upper_radius_mm: float | None = None
-    tip_diameter_mm: float | None = None
-    neck_diameter_mm: float | None = None
-    tip_length_mm: float | None = None
-    profile: list[Annotated[list[float], Field(min_length=2, max_length=3)]] | None = Field(
-        None, max_length=MOST_POINTS, description="Points r, z from the tip up, and the radius of the arc to each where it is one."
-    )
+    helix_deg: float | Offsets = 0.0
+    helix_kind: Text | None = None
+    pitch_deg: Offsets | None = None
+    shape: Text | None = None
+    profile: Points | None = None
     serration: SerrationKeys | None = None
-    runout_mm: list[float] | None = Field(None, max_length=MOST_TEETH)
-    axial_runout_mm: list[float] | None = Field(None, max_length=MOST_TEETH)
-    tilt_deg: float | None = None
+    runout_mm: Offsets | None = None
+    axial_runout_mm: Offsets | None = None
 
 
-class SegmentKeys(Body):
+class SegmentKeys(Keys, fields=SEGMENT):
     """A segment of tool or holder, from the free end towards the flange."""
 
-    length_mm: float
-    outer_diameter_mm: float
     inner_diameter_mm: float = 0.0
-    end_diameter_mm: float | None = None
     material: Text
-    area_mm2: float | None = None
-    second_moment_mm4: float | None = None
 
 
 class ToolKeys(Body):
@@ -102,37 +80,23 @@ class HolderKeys(Body):
     taper: Text | None = Field(None, description="What a ring hears behind the flange, as HSK-A63.")
 
 
-class ContactKeys(Body):
+class ContactKeys(Keys, fields=CONTACT):
     """[contact], per metre of insertion"""
 
-    translational_stiffness: float
-    rotational_stiffness: float
-    translational_damping: float
-    rotational_damping: float
+    translational_damping: float = Field()
+    rotational_damping: float = Field()
 
 
-class MaterialKeys(Body):
+class MaterialKeys(Keys, fields=MATERIAL):
     """[materials.NAME]"""
 
     youngs_modulus_gpa: float | None = None
     density: float | None = None
     poisson: float | None = None
-    loss_factor: float | None = None
 
 
-class SpreadKeys(Body):
+class SpreadKeys(Keys, fields=SPREAD):
     """[spread]: how well the drawing is known, standard deviations; 0 is exactly, and what is left out is as well as drawings are."""
-
-    stickout_mm: float | None = None
-    fluted_diameter_percent: float | None = None
-    youngs_modulus_percent: float | None = None
-    contact_stiffness_percent: float | None = None
-    contact_damping_percent: float | None = None
-    holder_diameter_percent: float | None = None
-    reclamping_percent: float | None = None
-    spindle_joint_percent: float | None = None
-    segment_length_mm: float | None = None
-    corner_radius_mm: float | None = None
 
 
 class ToolingKeys(Body):

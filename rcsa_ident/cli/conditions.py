@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray
     from rcsa_ident.cutting.conditions import Engagement
     from rcsa_ident.cutting.power import SpindleDrive
-    from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
+    from rcsa_ident.cutting.process import SpeedVariation
     from rcsa_ident.cutting.stock import AskedEngagement
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.machine.machine import TipSource
-    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+    from rcsa_ident.setup.cut import CutSpec
+    from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.workflows.tool_change import ToolChange
 
 
@@ -132,23 +133,14 @@ def share_of(percent: float, option: str, most: float, above: bool = False) -> f
 
 def cut_of(cut: CutOptions, speed_variation: str | None = None) -> CutSpec:
     """Return the cut that is asked about."""
-    from rcsa_ident.setup.machining_setup import CutSpec
+    from rcsa_ident.setup.cut import asked_cut
 
-    given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}
-    given |= {} if cut.krc is None else {"radial_ratio": cut.krc}
-    given |= {} if cut.kac is None else {"axial_ratio": cut.kac}
-    given |= {} if cut.kte_n_per_mm is None else {"tangential_edge": cut.kte_n_per_mm * 1e3}
-    given |= {} if cut.kre_n_per_mm is None else {"radial_edge": cut.kre_n_per_mm * 1e3}
-    return CutSpec(
-        _stock(cut),
-        feed_angle(cut.feed_direction),
-        None if cut.feed_per_tooth_mm is None else cut.feed_per_tooth_mm * 1e-3,
-        cut.material,
-        given,
-        None if cut.runout_um is None else tuple(offset * 1e-6 for offset in numbers(cut.runout_um, "--runout-um", "um")),
-        _damping(cut),
-        _variation(speed_variation),
-    )
+    told, angle = _stock(cut), feed_angle(cut.feed_direction)
+    offsets = None if cut.runout_um is None else numbers(cut.runout_um, "--runout-um", "um")
+    if (cut.wear_land_um is None) != (cut.indentation is None):
+        missing = "--wear-land-um" if cut.wear_land_um is None else "--indentation"
+        raise InputError(missing, "nothing", "--wear-land-um [um] and --indentation [N/m^3], or neither")
+    return asked_cut(told, angle, vars(cut) | {"runout_um": offsets}, _variation(speed_variation))
 
 
 def _stock(cut: CutOptions) -> AskedEngagement:
@@ -179,17 +171,6 @@ def _stock(cut: CutOptions) -> AskedEngagement:
     if angles:
         return engagement(cut.immersion, cut.strategy, cut.entry_deg, cut.exit_deg)
     return Immersion(immersion_of(cut.immersion), str(cut.strategy))
-
-
-def _damping(cut: CutOptions) -> ProcessDamping | None:
-    from rcsa_ident.cutting.process import ProcessDamping
-
-    if cut.wear_land_um is None and cut.indentation is None:
-        return None
-    if cut.wear_land_um is None or cut.indentation is None:
-        missing = "--wear-land-um" if cut.wear_land_um is None else "--indentation"
-        raise InputError(missing, "nothing", "--wear-land-um [um] and --indentation [N/m^3], or neither")
-    return ProcessDamping(cut.indentation, cut.wear_land_um * 1e-6, cut.friction)
 
 
 def _variation(text: str | None) -> SpeedVariation | None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from rcsa_ident.base.plausibility import Range
+from rcsa_ident.setup.fields import ASKED_CUT, Field, Number
 from rcsa_ident.stability.methods import MethodName
 
 
@@ -56,7 +58,30 @@ def takes_groups(command: Callable[..., Any]) -> Callable[..., Any]:
     return spread
 
 
-_TIP, _CUT, _SPEEDS, _SPINDLE = "The tip", "The cut", "Speeds and method", "The spindle"
+class KeyOptions:
+    """A group made of declared keys: an option for each, which a class may type otherwise than files and bodies do."""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **keys: Any) -> None: ...
+
+        def __getattr__(self, key: str) -> Any: ...
+
+    def __init_subclass__(cls, fields: Sequence[Field], panel: str, metavars: Mapping[str, str]) -> None:
+        typed, called = get_type_hints(cls), {each.key: f"--{each.key.replace('_', '-')}" for each in fields}
+        cls.__annotations__ = {}
+        for each in fields:
+            default = getattr(cls, each.key, each.default)
+            kind = typed.get(each.key, float if isinstance(each.kind, Range | Number) else str)
+            option = typer.Option(
+                help=each.help.format_map(called), metavar=metavars.get(each.key), show_default=default is not None, rich_help_panel=panel
+            )
+            cls.__annotations__[each.key] = Annotated[kind if default is not None else kind | None, option]
+            setattr(cls, each.key, default)
+        dataclass(frozen=True)(cls)
+
+
+_TIP, _SPEEDS, _SPINDLE = "The tip", "Speeds and method", "The spindle"
 Bands = Annotated[bool, typer.Option(help="Add columns with uncertainty bands.")]
 StiffnessSpread = Annotated[
     float, typer.Option(help="Standard deviation of the tool-holder's stiffness, %: part of the bands. 1 for a modulus from a handbook.")
@@ -112,76 +137,13 @@ class TipOptions:
     ] = None
 
 
-@dataclass(frozen=True, slots=True)
-class CutOptions:
+class CutOptions(KeyOptions, fields=ASKED_CUT, panel="The cut", metavars={"engagement": "MAP.csv", "runout_um": "A,B,..."}):
     """What is cut, and how."""
 
-    immersion: Annotated[str, typer.Option(help="Radial depth over diameter, as 0.5 or 50%; 1 is a slot.", rich_help_panel=_CUT)] = "0.5"
-    strategy: Annotated[Strategy, typer.Option(help="Up or down milling.", rich_help_panel=_CUT)] = Strategy.down
-    entry_deg: Annotated[
-        float | None,
-        typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False, rich_help_panel=_CUT),
-    ] = None
-    exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False, rich_help_panel=_CUT)] = None
-    stock: Annotated[
-        Stock | None,
-        typer.Option(
-            help="What stands around the cutter: stepover of --immersion, as where the same cutter cut before (the default), or a block.",
-            show_default=False,
-            rich_help_panel=_CUT,
-        ),
-    ] = None
-    y_from_mm: Annotated[
-        float | None,
-        typer.Option(help="One side of a block, mm beside the cutter's path along the normal.", show_default=False, rich_help_panel=_CUT),
-    ] = None
-    y_to_mm: Annotated[float | None, typer.Option(help="The other side, mm.", show_default=False, rich_help_panel=_CUT)] = None
-    engagement: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MAP.csv",
-            help="Angles between which the edge cuts at each height: z_mm, entry_angle_deg, exit_angle_deg.",
-            show_default=False,
-            rich_help_panel=_CUT,
-        ),
-    ] = None
-    lead_deg: Annotated[
-        float | None,
-        typer.Option(help="How far the tool leans towards the feed, degrees; with --engagement.", show_default=False, rich_help_panel=_CUT),
-    ] = None
-    feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.", rich_help_panel=_CUT)] = "+X"
-    feed_per_tooth_mm: Annotated[
-        float | None, typer.Option(help="Feed per tooth, mm: power, run-out, surface error.", show_default=False, rich_help_panel=_CUT)
-    ] = None
-    material: Annotated[
-        str | None, typer.Option(help="Coefficients of a material of the library.", show_default=False, rich_help_panel=_CUT)
-    ] = None
-    ktc_mpa: Annotated[
-        float | None,
-        typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False, rich_help_panel=_CUT),
-    ] = None
-    krc: Annotated[
-        float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False, rich_help_panel=_CUT)
-    ] = None
-    kac: Annotated[
-        float | None, typer.Option(help="Axial ratio; default: the result's workpiece, or 0.", show_default=False, rich_help_panel=_CUT)
-    ] = None
-    kte_n_per_mm: Annotated[float | None, typer.Option(help="Tangential edge force, N/mm.", show_default=False, rich_help_panel=_CUT)] = (
-        None
-    )
-    kre_n_per_mm: Annotated[float | None, typer.Option(help="Radial edge force, N/mm.", show_default=False, rich_help_panel=_CUT)] = None
-    runout_um: Annotated[
-        str | None, typer.Option(metavar="A,B,...", help="Radial offset of each edge, um.", show_default=False, rich_help_panel=_CUT)
-    ] = None
-    wear_land_um: Annotated[
-        float | None,
-        typer.Option(help="Width of the wear land behind the edge, um: adds process damping.", show_default=False, rich_help_panel=_CUT),
-    ] = None
-    indentation: Annotated[
-        float | None,
-        typer.Option(help="Indentation coefficient, N/m^3 (1e14 aluminium, 4e13 steel).", show_default=False, rich_help_panel=_CUT),
-    ] = None
-    friction: Annotated[float, typer.Option(help="Coefficient of friction of the flank, with --wear-land-um.", rich_help_panel=_CUT)] = 0.3
+    immersion: str = "0.5"
+    strategy: Strategy = Strategy.down
+    stock: Stock | None = None
+    engagement: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

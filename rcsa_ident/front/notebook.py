@@ -46,7 +46,8 @@ from rcsa_ident.report.listening import listening_figure
 from rcsa_ident.report.lobes import map_figure, save_figure, stability_figure, surface_figure
 from rcsa_ident.report.summaries import drawing_rows, mode_rows, two_digits
 from rcsa_ident.report.tap import tap_figure
-from rcsa_ident.setup.machining_setup import Campaign, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.tap import TapFrf

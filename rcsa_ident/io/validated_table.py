@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any, NoReturn
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.plausibility import Range
+from rcsa_ident.setup.fields import NEEDED, Field, Named, Number
 
-_REQUIRED: Any = object()
 #: A date with its time of day, as `datetime.fromisoformat` reads it.
 _MOMENT = r"^\d{4}-[01]\d-[0-3]\dT[0-2]\d:[0-5]\d(:[0-5]\d(\.\d+)?)?(Z|[+-]\d\d:\d\d)?$"
 
@@ -113,7 +113,7 @@ class Table:
         """
         raise InputError(self.name(key), found, allowed, self.where)
 
-    def value(self, key: str, allowed: str, default: Any = _REQUIRED, schema: Mapping[str, Any] | None = None) -> Any:
+    def value(self, key: str, allowed: str, default: Any = NEEDED, schema: Mapping[str, Any] | None = None) -> Any:
         """Return what stands under `key`; without a default the key must be there.
 
         Parameters
@@ -128,10 +128,10 @@ class Table:
         if self._asked is not None:
             usual = {"default": default} if isinstance(default, str | int | float) else {}
             self._asked.keys[key] = {**(schema or {"description": allowed}), **usual}
-            (self._asked.required.add if default is _REQUIRED else self._asked.required.discard)(key)
+            (self._asked.required.add if default is NEEDED else self._asked.required.discard)(key)
         if key in self.data:
             return self.data[key]
-        if default is _REQUIRED:
+        if default is NEEDED:
             self.refuse(key, "nothing", allowed)
         return default
 
@@ -139,7 +139,7 @@ class Table:
         self,
         key: str,
         unit: str = "",
-        default: Any = _REQUIRED,
+        default: Any = NEEDED,
         *,
         above: float | None = None,
         least: float | None = None,
@@ -177,7 +177,7 @@ class Table:
             self.refuse(key, describe(value), allowed)
         return int(number) if whole else number
 
-    def quantity(self, key: str, kind: Range, default: Any = _REQUIRED) -> Any:
+    def quantity(self, key: str, kind: Range, default: Any = NEEDED) -> Any:
         """Return a number in its own unit that is possible for a quantity; a default is returned unchecked.
 
         Parameters
@@ -278,7 +278,7 @@ class Table:
             numbers.append(number)
         return numbers
 
-    def text(self, key: str, default: Any = _REQUIRED, choices: Collection[str] = (), allowed: str = "a text", names_of: str = "") -> Any:
+    def text(self, key: str, default: Any = NEEDED, choices: Collection[str] = (), allowed: str = "a text", names_of: str = "") -> Any:
         """Return a non-empty text, one of `choices` if there are any; a default is returned unchecked.
 
         Parameters
@@ -310,12 +310,12 @@ class Table:
     def texts(self, key: str, allowed: str, required: bool = True) -> list[str]:
         """Return a list of non-empty texts; where it is not required it may be missing or empty."""
         schema = {"type": "array", "items": {"type": "string", "minLength": 1}} | ({"minItems": 1} if required else {})
-        found = self.value(key, allowed, _REQUIRED if required else [], schema)
+        found = self.value(key, allowed, NEEDED if required else [], schema)
         if not _is_list(found) or (required and not found) or not all(isinstance(text, str) and text for text in found):
             self.refuse(key, describe(found), allowed)
         return list(found)
 
-    def table(self, key: str, known: Collection[str] | None = None, default: Any = _REQUIRED) -> Table:
+    def table(self, key: str, known: Collection[str] | None = None, default: Any = NEEDED) -> Table:
         """Return the table under `key`.
 
         Parameters
@@ -335,7 +335,7 @@ class Table:
             self.refuse(key, describe(value), allowed)
         return [Table(item, self.where, f"{self.name(key)}[{i}]", known) for i, item in enumerate(value)]
 
-    def named_tables(self, key: str, known: Collection[str] | None = None, default: Any = _REQUIRED) -> dict[str, Table]:
+    def named_tables(self, key: str, known: Collection[str] | None = None, default: Any = NEEDED) -> dict[str, Table]:
         """Return the tables below `key` by their own names.
 
         Parameters
@@ -347,6 +347,33 @@ class Table:
         """
         outer = self.table(key, None, default)
         return {name: Table(item, self.where, outer.name(name), known) for name, item in outer.data.items()}
+
+    def field(self, field: Field) -> Any:
+        """Return what stands under a declared key, in its unit."""
+        match kind := field.kind:
+            case Range():
+                return self.quantity(field.key, kind, field.default)
+            case Number(unit, _, least, most, above, whole):
+                return self.number(field.key, unit, field.default, above=above, least=least, most=most, whole=whole)
+            case Named(names, number, what):
+                assert number.least is not None
+                assert number.most is not None
+                return self.number_or(field.key, names, what, number.unit, number.least, number.most)
+            case tuple():
+                return self.text(field.key, field.default, choices=kind)
+            case _:
+                return self.flag(field.key, field.default) if kind is bool else self.text(field.key, field.default)
+
+    def fields(self, fields: Iterable[Field], defaults: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Return what stands under declared keys, in their units; `defaults` count before those that are declared.
+
+        Parameters
+        ----------
+        fields : iterable of Field
+        defaults : mapping, optional
+        """
+        usual = defaults or {}
+        return {each.key: self.field(replace(each, default=usual.get(each.key, each.default))) for each in fields}
 
     @contextmanager
     def naming(self, names: Mapping[str, str]) -> Iterator[None]:

@@ -14,7 +14,7 @@ from rcsa_ident.cutting.outlines import ANGLES, in_files
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.report.edge_detail import edge_detail
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import BeamSegment
 
 #: Drawn on a paper of its own, so that it reads on a light page and on a dark one.

@@ -57,6 +57,7 @@ CALLS = [
     ("POST", "/toolings/import", {"data": []}, "upload"),
     ("GET", "/materials", None, "read"),
     ("GET", "/schemas/n", None, "read"),
+    ("GET", "/fields", None, "read"),
     ("POST", "/campaigns/preview", {"files": []}, "read"),
     ("POST", "/tested-cuts/preview", None, "read"),
     ("GET", "/holders", None, "read"),

@@ -1,11 +1,7 @@
 """Schemas of the TOML files over REST, and of answers that hold what was learned."""
 
-import re
-
 import numpy as np
-import pytest
 
-from api.routes.static_files import FOLDER
 from api.schemas.campaigns import NewCampaign
 from api.schemas.machines import Modes
 from api.schemas.queries import Band, ToolingAdvice, ToolingLobes
@@ -14,12 +10,10 @@ from api.work.tasks import modes
 from rcsa_ident.dynamics.uncertain import Doubted
 from rcsa_ident.io.results.drawings import known_toolings_to_json
 from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of
-from rcsa_ident.io.settings.setups import SPREADS
 from rcsa_ident.report.summaries import band_summary
 from rcsa_ident.stability.band_shares import BandShares
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 from rcsa_ident.tool_holder.learnt import LearnedValue
-from rcsa_ident.tool_holder.spread import Spread
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
 
@@ -53,12 +47,6 @@ def test_bodies_have_the_keys_of_the_files():
     assert "sensors.*.gain_spread_percent" in of_file
     # a file names its toolings' files; a body may hold the toolings
     assert {each for each in of_body if not each.startswith("toolings.")} == of_file - {"toolings.*"}
-
-
-def test_the_page_offers_the_spreads_that_an_empty_field_stands_for():
-    text = (FOLDER / "js" / "views" / "doubt_card.js").read_text(encoding="utf-8")
-    offered = {key: float(value) for key, value in re.findall(r'\["(\w+)", "[^"]+", "(?:length|percent)", ([\d.]+)', text)}
-    assert offered == {key: pytest.approx(getattr(Spread(), field) / size) for key, (field, size) in SPREADS.items()}
 
 
 def test_modes_tell_what_was_learned_of_toolings(tmp_path):

@@ -79,6 +79,9 @@ const KINDS = {
   ],
 };
 
+/** The kind of what a declared unit is of. */
+export const kindOf = (unit) => ({ mm: "length", deg: "degree", "%": "percent" })[unit] ?? "none";
+
 let inch = false;
 try {
   inch = localStorage.getItem("rcsa.units") === "inch";

@@ -15,11 +15,12 @@ from rcsa_ident.dynamics.passivity import judged
 from rcsa_ident.dynamics.receptance import MeasuredCurve
 from rcsa_ident.io.curves.frf_files import read_frfs
 from rcsa_ident.io.files import read_bytes, write_text
-from rcsa_ident.io.settings.setups import SPREADS, read_tooling
+from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.toolings import CONTACT_SPREADS
 from rcsa_ident.io.toml_text import LARGEST_SETUP, one_line
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.setup.machining_setup import HammerTest
+from rcsa_ident.setup.campaign import HammerTest
+from rcsa_ident.setup.fields import SPREAD, keys_of
 from rcsa_ident.tool_holder.geometry import Contact
 from rcsa_ident.tool_holder.spread import LARGEST_SHARE
 
@@ -132,7 +133,7 @@ def write_calibrated_tooling(
         document.pop("contact", None)
         document.append("contact", table)
     if "spread" not in document:
-        document.append("spread", tomlkit.item(dict.fromkeys(SPREADS, 0)))
+        document.append("spread", tomlkit.item(dict.fromkeys(keys_of(SPREAD), 0)))
     spread = document["spread"]
     assert isinstance(spread, Table | InlineTable)
     for key, size in zip(CONTACT_SPREADS, (max(log_std[:2]), max(log_std[2:])), strict=True):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP, SPINDLE_SPEED
+from rcsa_ident.base.plausibility import LARGEST_SWEEP, LEAST_SWEEP
 from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cutting.conditions import AnyEngagement, Block, CuttingConditions, Engagement, EngagementMap, Stepover
 from rcsa_ident.cutting.cutter import Cutter
@@ -17,28 +17,17 @@ from rcsa_ident.cutting.stock import check_cut, engagement_between, engagement_w
 from rcsa_ident.io.settings.engagements import COLUMNS as MAP_COLUMNS
 from rcsa_ident.io.settings.engagements import MOST_ROWS, engagement_map_of, read_engagement_map, rows_of_map
 from rcsa_ident.io.validated_table import Table, as_number, describe
-from rcsa_ident.setup.machining_setup import Cut, Tooling
+from rcsa_ident.setup.cut import Cut
+from rcsa_ident.setup.fields import CUT, ENGAGEMENT, RECORDINGS, keys_of, told_in_si
+from rcsa_ident.setup.tooling import Tooling
 
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 _ANGLES, _SIDES, _RADIAL = ("entry_angle_deg", "exit_angle_deg"), ("y_from_mm", "y_to_mm"), ("radial_depth_mm", "strategy")
-_MAP = ("engagement", "lead_deg", "tilt_deg")
-ENGAGEMENT_KEYS = (*_ANGLES, *_RADIAL, "stock", *_SIDES, *_MAP)
-CUT_KEYS = (
-    "id",
-    "tooling",
-    "spindle_speed_rpm",
-    "spindle_speed_to_rpm",
-    "axial_depth_mm",
-    "feed_per_tooth_mm",
-    *ENGAGEMENT_KEYS,
-    "feed_direction",
-    "cut",
-    "air",
-    "posture_deg",
-    "started",
-    "temperature_c",
-    "validation",
-)
+ENGAGEMENT_KEYS = keys_of(ENGAGEMENT)
+_CUT = {each.key: each for each in (*CUT, *RECORDINGS)}
+#: Recordings stand behind the direction of the feed.
+CUT_KEYS = (*keys_of(CUT[: CUT.index(_CUT["posture_deg"])]), *keys_of(RECORDINGS), *keys_of(CUT[CUT.index(_CUT["posture_deg"]) :]))
+_CONDITIONS = tuple(_CUT[key] for key in ("spindle_speed_rpm", "axial_depth_mm", "feed_per_tooth_mm"))
 
 
 def cut_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table, str], Path]) -> Cut:
@@ -59,13 +48,8 @@ def cut_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Tabl
     """
     tooling = table.text("tooling", choices=tuple(toolings), names_of="toolings")
     cutter = toolings[tooling].cutter
-    conditions = CuttingConditions(
-        from_rpm(table.quantity("spindle_speed_rpm", SPINDLE_SPEED)),
-        table.quantity("axial_depth_mm", AXIAL_DEPTH) * 1e-3,
-        table.quantity("feed_per_tooth_mm", FEED_PER_TOOTH) * 1e-3,
-        engagement_of(table, cutter, locate),
-        feed_angle_of(table),
-    )
+    programmed = told_in_si(_CONDITIONS, table.fields(_CONDITIONS))
+    conditions = CuttingConditions(**programmed, engagement=engagement_of(table, cutter, locate), feed_angle=feed_angle_of(table))
     own = {"depth": table.name("axial_depth_mm"), "helix": table.name("axial_depth_mm")}
     with table.naming(own):
         check_cut(cutter, conditions.engagement, conditions.axial_depth, conditions.feed_per_tooth)
@@ -81,8 +65,8 @@ def cut_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Tabl
         _last_speed(table, conditions.spindle_speed),
         posture,
         table.moment("started"),
-        table.number("temperature_c", "°C", None, least=-40.0, most=200.0),
-        table.flag("validation", False),
+        table.field(_CUT["temperature_c"]),
+        table.field(_CUT["validation"]),
     )
 
 
@@ -96,12 +80,12 @@ def engagement_of(table: Table, cutter: Cutter, locate: Callable[[Table, str], P
     locate : callable
         Given the table and the key ``engagement``, returns the file.
     """
-    stock = table.text("stock", None, choices=("stepover", "block"))
+    stock = table.field(_CUT["stock"])
     if "engagement" in table:
         _alone(table, "engagement", (*_ANGLES, *_RADIAL, *_SIDES, "stock"))
-        lead = np.radians(table.number("lead_deg", "deg", 0.0, least=-89.0, most=89.0))
+        lead = np.radians(table.field(_CUT["lead_deg"]))
         # what it does to the engagement is in the map
-        table.number("tilt_deg", "deg", 0.0, least=-89.0, most=89.0)
+        table.field(_CUT["tilt_deg"])
         return _map(table, float(lead), locate)
     for key in ("lead_deg", "tilt_deg"):
         if key in table:
@@ -112,10 +96,10 @@ def engagement_of(table: Table, cutter: Cutter, locate: Callable[[Table, str], P
     if any(key in table for key in _RADIAL):
         _alone(table, "radial_depth_mm", _ANGLES)
         widest = 2e3 * cutter.outline.largest_radius
-        width = table.number("radial_depth_mm", "mm", above=0.0, most=widest * (1.0 + 1e-9))
+        width = table.field(_CUT["radial_depth_mm"].up_to(widest * (1.0 + 1e-9)).needed)
         # a slot is up and down milling
         needs = "strategy" in table or width < widest * (1.0 - 1e-9)
-        strategy = table.text("strategy", choices=("up", "down")) if needs else "down"
+        strategy = table.field(_CUT["strategy"].needed) if needs else "down"
         return engagement_with(Stepover(1e-3 * width, strategy), cutter)
     entry, leave = _angles(table)
     found = engagement_between(entry, leave, cutter)
@@ -149,7 +133,7 @@ def _block(table: Table, cutter: Cutter) -> AnyEngagement:
     _alone(table, "stock = block", _RADIAL)
     if any(key in table for key in _SIDES):
         _alone(table, "y_from_mm", _ANGLES)
-        low, high = (table.number(key, "mm", least=-1e4, most=1e4) * 1e-3 for key in _SIDES)
+        low, high = (table.field(_CUT[key].needed) * 1e-3 for key in _SIDES)
         if not low < high:
             table.refuse("y_to_mm", f"{1e3 * high:g}", f"above y_from_mm, {1e3 * low:g} [mm]")
     else:
@@ -160,8 +144,7 @@ def _block(table: Table, cutter: Cutter) -> AnyEngagement:
 
 
 def _angles(table: Table) -> tuple[float, float]:
-    entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
-    leave = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
+    entry, leave = (table.field(_CUT[key].needed) for key in _ANGLES)
     if leave <= entry:
         table.refuse("exit_angle_deg", f"{leave:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     return float(np.radians(entry)), float(np.radians(leave))
@@ -178,7 +161,7 @@ def _last_speed(table: Table, first: float) -> float | None:
     """At which a pass ends whose speed changes, [rad/s]."""
     if "spindle_speed_to_rpm" not in table:
         return None
-    last = from_rpm(table.quantity("spindle_speed_to_rpm", SPINDLE_SPEED))
+    last = from_rpm(table.field(_CUT["spindle_speed_to_rpm"]))
     if not LEAST_SWEEP <= abs(last / first - 1.0) <= LARGEST_SWEEP:
         allowed = f"{100 * LEAST_SWEEP:g} % to {100 * LARGEST_SWEEP:g} % beside spindle_speed_rpm, {to_rpm(first):g}"
         table.refuse("spindle_speed_to_rpm", f"{to_rpm(last):g}", f"{allowed}; without it the cut keeps its speed")
@@ -186,7 +169,7 @@ def _last_speed(table: Table, first: float) -> float | None:
 
 
 def feed_angle_of(table: Table) -> float:
-    value = table.number_or("feed_direction", FEED_DIRECTIONS, "an angle from +X", "deg", -360.0, 360.0)
+    value = table.field(_CUT["feed_direction"])
     return FEED_DIRECTIONS[value] if isinstance(value, str) else float(np.radians(value))
 
 

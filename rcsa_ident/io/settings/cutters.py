@@ -2,37 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.base.plausibility import DIAMETER
 from rcsa_ident.cutting.cutter import Cutter, HelixKind
 from rcsa_ident.cutting.outlines import TAKES, Dimensions, in_files, key_of, outline_of, outline_through, rows_through
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration, WaveShape
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.validated_table import Table, as_number, describe
+from rcsa_ident.setup.fields import CUTTER, keys_of, told_in_si
+from rcsa_ident.setup.fields import DIMENSIONS as DIMENSION_FIELDS
 
-#: Dimensions by the keys of files, each with its field; angles are in degrees.
-DIMENSIONS = {key_of(each.name): each.name for each in fields(Dimensions)}
-CUTTER_KEYS = (
-    "teeth",
-    "diameter_mm",
-    "helix_deg",
-    "helix_kind",
-    "pitch_deg",
-    "shape",
-    "corner_radius_mm",
-    *DIMENSIONS,
-    "profile",
-    "serration",
-    "runout_mm",
-    "axial_runout_mm",
-    "tilt_deg",
-)
+#: Dimensions by the keys of files, each with its field.
+DIMENSIONS = {each.key: each.name for each in DIMENSION_FIELDS}
+CUTTER_KEYS = keys_of(CUTTER)
+_OWN = {each.key: each for each in CUTTER}
 _SERRATION = ("amplitude_mm", "wavelength_mm", "shape", "shift", "table")
 #: Points of an outline of one's own, at most.
 MOST_POINTS = 500
@@ -69,13 +56,13 @@ def cutter_of(table: Table) -> Cutter:
     InputError
         Names the file, the key, what was found and what is allowed: also of outlines that cannot be, and of keys that a shape has not.
     """
-    teeth = table.number("teeth", least=1, most=100, whole=True)
-    diameter = table.quantity("diameter_mm", DIAMETER) * 1e-3
-    shape = CutterShape(table.text("shape", CutterShape.FLAT, choices=tuple(CutterShape)))
-    corner = table.number("corner_radius_mm", "mm", 0.0, least=0.0, most=1000.0) * 1e-3
+    teeth = table.field(_OWN["teeth"])
+    diameter = table.field(_OWN["diameter_mm"]) * 1e-3
+    shape = CutterShape(table.field(_OWN["shape"]))
+    corner = table.field(_OWN["corner_radius_mm"]) * 1e-3
     if not shape.has_room(corner, diameter):
         table.refuse("corner_radius_mm", f"{1e3 * corner:g}", f"at most half of the diameter, {500.0 * diameter:g} [mm]")
-    dimensions = Dimensions(**{name: _dimension(table, key) for key, name in DIMENSIONS.items()})
+    dimensions = Dimensions(**told_in_si(DIMENSION_FIELDS, table.fields(DIMENSION_FIELDS)))
     rows = _rows(table)
     _check_keys(table, shape)
     # None of pitch and run-out is what the cutter takes by default
@@ -84,8 +71,8 @@ def cutter_of(table: Table) -> Cutter:
         "pitch": _pitch(table, teeth),
         "runout": _offsets(table, "runout_mm", teeth),
         "axial_runout": _offsets(table, "axial_runout_mm", teeth),
-        "helix_kind": HelixKind(table.text("helix_kind", HelixKind.LEAD, choices=tuple(HelixKind))),
-        "tilt": float(np.radians(table.number("tilt_deg", "deg", 0.0, least=-1.0, most=1.0))),
+        "helix_kind": HelixKind(table.field(_OWN["helix_kind"])),
+        "tilt": float(np.radians(table.field(_OWN["tilt_deg"]))),
     }
     wave = _wave(table, teeth)
     with table.naming(_NAMES):
@@ -97,14 +84,6 @@ def cutter_of(table: Table) -> Cutter:
         )
     _check_width(table, profile, diameter)
     return cutter
-
-
-def _dimension(table: Table, key: str) -> float | None:
-    if key.endswith("_deg"):
-        angle = table.number(key, "deg", None, above=0.0, most=179.0)
-        return None if angle is None else float(np.radians(angle))
-    length = table.number(key, "mm", None, above=0.0, most=10_000.0)
-    return None if length is None else length * 1e-3
 
 
 def _check_keys(table: Table, shape: CutterShape) -> None:

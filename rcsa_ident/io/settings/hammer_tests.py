@@ -10,25 +10,14 @@ import numpy as np
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import HammerTest, Tooling
+from rcsa_ident.setup.campaign import HammerTest
+from rcsa_ident.setup.fields import HAMMER_TEST, keys_of, told_in_si
+from rcsa_ident.setup.tooling import Tooling
 
-HAMMER_TEST_KEYS = (
-    "id",
-    "tooling",
-    "axis",
-    "response",
-    "force",
-    "file",
-    "record",
-    "units",
-    "standstill",
-    "sensor_mass_g",
-    "from_hz",
-    "to_hz",
-    "error_percent",
-    "correction",
-)
-_POINTS = ("tip", "flange")
+HAMMER_TEST_KEYS = keys_of(HAMMER_TEST)
+_OWN = {each.key: each for each in HAMMER_TEST}
+#: Whose noun needs no other key.
+_PLAIN = tuple(_OWN[key] for key in ("record", "units", "standstill", "sensor_mass_g", "error_percent"))
 
 
 def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table, str], Path]) -> HammerTest:
@@ -48,15 +37,14 @@ def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callab
     """
     name = table.text("id")
     tooling = table.text("tooling", choices=tuple(toolings), names_of="toolings")
-    axis = Dof(table.text("axis", choices=("X", "Y")).lower())
+    axis = Dof(table.field(_OWN["axis"]).lower())
     assembly = toolings[tooling].assembly
     longest = 1e3 * (assembly.stickout + assembly.holder_length)
     response, force = (_point(table, key, longest) for key in ("response", "force"))
     if response is None and force is None:
         allowed = "a point of the tool-holder, tip or mm from it, where the response is measured at the flange"
         table.refuse("force", "flange", allowed)
-    low = table.number("from_hz", "Hz", 0.0, least=0.0, most=1e6)
-    high = table.number("to_hz", "Hz", None, above=0.0, most=1e6)
+    low, high = table.field(_OWN["from_hz"]), table.field(_OWN["to_hz"])
     if high is not None and high <= low:
         table.refuse("to_hz", f"{high:g}", f"above from_hz, {low:g} [Hz]")
     return HammerTest(
@@ -66,19 +54,15 @@ def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callab
         response,
         force,
         locate(table, "file"),
-        table.number("record", "", None, least=1, most=100_000, whole=True),
-        table.text("units", None),
-        table.flag("standstill", True),
-        table.number("sensor_mass_g", "g", 0.0, least=0.0, most=1000.0) * 1e-3,
-        (low, np.inf if high is None else high),
-        table.number("error_percent", "%", 2.0, least=0.0, most=100.0) * 1e-2,
-        Correction(table.text("correction", "auto", choices=tuple(Correction))),
+        band=(low, np.inf if high is None else high),
+        **told_in_si(_PLAIN, table.fields(_PLAIN)),
+        correction=Correction(table.field(_OWN["correction"])),
     )
 
 
 def _point(table: Table, key: str, longest: float) -> float | None:
     """Distance of a point from the tip [m]; None is the machine's side of the flange."""
-    value = table.number_or(key, _POINTS, "the distance from the tip", "mm", 0.0, longest)
+    value = table.field(_OWN[key].up_to(longest))
     if isinstance(value, str):
         return 0.0 if value == "tip" else None
     return value * 1e-3

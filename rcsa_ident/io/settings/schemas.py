@@ -1,6 +1,6 @@
-"""JSON Schema of the TOML files that people write, made of what their readers ask of complete files: no key has a second list.
+"""JSON Schema of the TOML files that people write, made of what their readers ask of some files: no key has a second list.
 
-A reader is run over files that hold everything it knows. What it asks there (types, limits, choices, what must be there) is
+A reader is run over files that make it ask for everything it knows. What it asks there (types, limits, choices, what must be there) is
 the schema; a limit that two files of these disagree on hangs on other keys, and only the reader knows it.
 """
 
@@ -20,9 +20,9 @@ from rcsa_ident.io.settings.cases import cases_of
 from rcsa_ident.io.settings.machines import machine_of
 from rcsa_ident.io.settings.modes import modes_of
 from rcsa_ident.io.settings.robots import robot_of
-from rcsa_ident.io.settings.setups import SPREADS, campaign_of, tooling_of
+from rcsa_ident.io.settings.setups import campaign_of, tooling_of
 from rcsa_ident.io.validated_table import Asked, Table, listening
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 
 #: draft-07 is what editors' TOML extensions understand.
@@ -69,7 +69,7 @@ _TOOLINGS = (
         "holder": _HOLDER | {"model": "PG25", "taper": "HSK-A63"},
         "contact": _STIFF,
         "materials": _MATERIALS,
-        "spread": dict.fromkeys(SPREADS, 1.0),
+        "spread": {},
     },
 )
 #: A tooling of other sizes: what hangs on those of the tooling is no limit of a campaign's keys.
@@ -106,23 +106,12 @@ _CAMPAIGNS = (
         ],
     },
     {
-        "campaign": {"name": "without air", "sampling_rate_hz": 51200.0},
         "sensors": {"flange_y": {"quantity": "displacement", "axis": "Y", "sensitivity": 1e4}},
         "workpiece": dict(_WORKPIECE),
         "toolings": {"S1": "toolings/S1.toml"},
         "cuts": [
             {"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, "spindle_speed_to_rpm": 9e3, **_ANGLES, "cut": "recordings/1.h5"},
             {"id": "2", "tooling": "S1", "spindle_speed_rpm": 500.0, **_ANGLES, "cut": "recordings/2.h5", "posture_deg": [0.0, 20.0]},
-            {
-                "id": "3",
-                "tooling": "S1",
-                "spindle_speed_rpm": 500.0,
-                **_ANGLES,
-                "cut": "recordings/3.h5",
-                "started": "2026-11-27T08:15:00",
-                "temperature_c": 31.5,
-                "validation": True,
-            },
         ],
     },
     {
@@ -130,22 +119,6 @@ _CAMPAIGNS = (
         "frfs": [
             {"id": "longer", "tooling": "S2", "axis": "X", "response": 80.0, "force": "flange", "file": "frfs/1.frf"},
             {"id": "1", "tooling": "S1", "axis": "X", "response": "tip", "force": 80.0, "file": "frfs/1.frf"},
-            {
-                "id": "2",
-                "tooling": "S1",
-                "axis": "X",
-                "response": "tip",
-                "force": "tip",
-                "file": "frfs/1.uff",
-                "record": 2,
-                "units": "um/N",
-                "standstill": True,
-                "sensor_mass_g": 4.0,
-                "from_hz": 200.0,
-                "to_hz": 4000.0,
-                "error_percent": 3.0,
-                "correction": "reverse",
-            },
         ],
     },
 )
@@ -270,8 +243,8 @@ def _read_campaign(data: Mapping[str, Any]) -> object:
     return campaign_of(data, "", "", tooling, lambda table, key: Path(table.text(key, allowed="the path of a recording")))
 
 
-#: Files by name: what they are, their reader, and files that between them hold everything that it knows, each of what may be left out
-#: missing from one of them.
+#: Files by name: what they are, their reader, and files that between them have every table, every choice of keys, and what is asked for
+#: only where it is there; each of these is missing from one of them.
 _FILES: dict[str, tuple[str, Callable[[Mapping[str, Any]], object], Iterable[Mapping[str, Any]]]] = {
     "tooling": ("A holder, a tool clamped in it, and the cutter", lambda data: tooling_of(data, "", ""), _TOOLINGS),
     "campaign": ("campaign.toml: sensors, workpiece, toolings, cuts and hammer tests", _read_campaign, _CAMPAIGNS),

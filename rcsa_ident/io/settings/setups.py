@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import (
-    CONTACT,
-    DENSITY,
-    LOSS_FACTOR,
-    MODULUS,
-    SEGMENT_DIAMETER,
-    SEGMENT_LENGTH,
-    STICKOUT,
-)
+from rcsa_ident.base.plausibility import STICKOUT
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.settings.cuts import CUT_KEYS, cut_of
 from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_of
@@ -25,50 +17,23 @@ from rcsa_ident.io.settings.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
-from rcsa_ident.setup.machining_setup import BareCutter, Campaign, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.fields import CAMPAIGN, CONTACT, MATERIAL, SEGMENT, SENSOR, SPREAD, keys_of, told_in_si
+from rcsa_ident.setup.tooling import BareCutter, Tooling
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
 from rcsa_ident.tool_holder.catalogue import assumed_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, behind, clamped
-from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, UNSTATED, Spread
+from rcsa_ident.tool_holder.spread import EXACT, UNSTATED, Spread
 from rcsa_ident.tool_holder.taper import tapers
 
 CAMPAIGN_FILE = "campaign.toml"
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials", "spread")
-_SEGMENT = (
-    "length_mm",
-    "outer_diameter_mm",
-    "inner_diameter_mm",
-    "end_diameter_mm",
-    "material",
-    "area_mm2",
-    "second_moment_mm4",
-)
-_CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
-_MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
-#: Keys of a tooling's [spread]: field of `Spread` and its size in SI.
-SPREADS = {
-    f"{field}_mm" if field in LENGTHS else f"{field}_percent": (field, 1e-3 if field in LENGTHS else 1e-2) for field in SPREAD_FIELDS
-}
-_HEAD = ("name", "sampling_rate_hz", "clock_error_percent", "axial_depth_spread_mm", "speed_softening_percent")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts", "frfs")
-_SENSOR = (
-    "quantity",
-    "axis",
-    "sensitivity",
-    "delay_s",
-    "bandwidth_hz",
-    "role",
-    "mount_resonance_hz",
-    "rotation_deg",
-    "gain_spread_percent",
-    "cross_talk_percent",
-    "delay_spread_us",
-    "distance_behind_flange_mm",
-    "distance_spread_mm",
-)
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
+#: All others than those that only a trigger has.
+_FEELS = tuple(each for each in SENSOR if each.key not in _TRIGGER[-2:])
 
 
 def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
@@ -122,14 +87,14 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str, tip_known: bool =
     carriers = beam_segments(holder, materials)
     # beside a tip that is known by itself nothing hangs on the drawing
     silent = EXACT if tip_known else UNSTATED
-    contact = _contact(top.table("contact", _CONTACT)) if "contact" in top else None
+    contact = contact_of(top.table("contact", keys_of(CONTACT))) if "contact" in top else None
     with top.naming({"stickout + insertion": "tool.stickout_mm + holder.insertion_mm", "insertion": "holder.insertion_mm"}):
         assembly = clamped(pieces, carriers, stickout, insertion, contact)
         return Tooling(
             name,
             cutter,
             assembly,
-            spread_of(top.table("spread", tuple(SPREADS)), contact) if "spread" in top else silent,
+            spread_of(top.table("spread", keys_of(SPREAD)), contact) if "spread" in top else silent,
             tool.text("model", ""),
             holder.text("model", ""),
             holder.text("taper", "", choices=tapers()),
@@ -141,65 +106,50 @@ def spread_of(table: Table, contact: Contact | None = None) -> Spread:
     """Return how well a drawing is known; what the table leaves out is what an honest drawing, or the catalogue's contact, is good for."""
     assumed = assumed_contact(contact)
     honest = Spread() if assumed is None else assumed.spread
-    found = {}
-    for key, (field, size) in SPREADS.items():
-        most = (LARGEST_LENGTH if field in LENGTHS else LARGEST_SHARE) / size
-        unit = "mm" if field in LENGTHS else "%"
-        found[field] = size * table.number(key, unit, getattr(honest, field) / size, least=0.0, most=round(most, 9))
-    return Spread(**found)
+    return Spread(**told_in_si(SPREAD, table.fields(SPREAD, spread_keys(honest))))
+
+
+def spread_keys(spread: Spread) -> dict[str, float]:
+    """Return how well a drawing is known as `spread` of a tooling file, in percent and millimetres."""
+    return {each.key: getattr(spread, each.name) / each.number.size for each in SPREAD}
 
 
 def material_library(top: Table) -> dict[str, Material]:
     """The built-in library, and the file's own over it; a known material may change single values."""
     materials = dict(MATERIALS)
-    for name, table in top.named_tables("materials", _MATERIAL, {}).items():
-        base = MATERIALS.get(name)
-        optional = (base.youngs_modulus, base.density, base.poisson) if base else None
-        modulus = table.quantity("youngs_modulus_gpa", MODULUS, *([optional[0] * 1e-9] if optional else []))
-        density = table.quantity("density", DENSITY, *([optional[1]] if optional else []))
-        poisson = table.number("poisson", "", *([optional[2]] if optional else []), least=0.0, most=0.499)
-        loss = table.quantity("loss_factor", LOSS_FACTOR, base.loss_factor if base else 0.0)
-        materials[name] = Material(modulus * 1e9, density, poisson, loss)
+    for name, table in top.named_tables("materials", keys_of(MATERIAL), {}).items():
+        known = material_keys(MATERIALS[name]) if name in MATERIALS else {}
+        materials[name] = Material(**told_in_si(MATERIAL, table.fields(MATERIAL, known)))
     return materials
 
 
+def material_keys(material: Material) -> dict[str, float]:
+    """Return a material as a table of ``[materials]``."""
+    return {each.key: getattr(material, each.name) * (1.0 / each.number.size) for each in MATERIAL}
+
+
 def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamSegment, ...]:
-    return tuple(_segment(table, materials) for table in body.tables("segments", _SEGMENT))
+    return tuple(_segment(table, materials) for table in body.tables("segments", keys_of(SEGMENT)))
 
 
 def _segment(table: Table, materials: Mapping[str, Material]) -> BeamSegment:
-    length = table.number("length_mm", "mm", above=0.0, most=SEGMENT_LENGTH.possible[1])
-    outer = table.quantity("outer_diameter_mm", SEGMENT_DIAMETER)
-    end = table.quantity("end_diameter_mm", SEGMENT_DIAMETER, None)
-    inner = table.number("inner_diameter_mm", "mm", 0.0, least=0.0)
+    told = table.fields(SEGMENT[:4])
     material = materials[table.text("material", choices=tuple(materials), names_of="materials")]
-    smallest, largest = min(outer, end or outer), max(outer, end or outer)
-    if inner >= smallest:
-        table.refuse("inner_diameter_mm", f"{inner:g}", f"below the outer diameter, {smallest:g} [mm]")
+    diameters = told["outer_diameter_mm"], told["end_diameter_mm"] or told["outer_diameter_mm"]
+    smallest, largest = min(diameters), max(diameters)
+    if told["inner_diameter_mm"] >= smallest:
+        table.refuse("inner_diameter_mm", f"{told['inner_diameter_mm']:g}", f"below the outer diameter, {smallest:g} [mm]")
     # a true section lies inside the circle around it
-    area = table.number("area_mm2", "mm^2", None, above=0.0, most=np.pi / 4.0 * largest**2)
-    moment = table.number("second_moment_mm4", "mm^4", None, above=0.0, most=np.pi / 64.0 * largest**4)
-    if (area is None) != (moment is None):
-        missing = "area_mm2" if area is None else "second_moment_mm4"
-        table.refuse(missing, "nothing", "given together with the other: area_mm2 and second_moment_mm4, or neither")
-    return BeamSegment(
-        length * 1e-3,
-        outer * 1e-3,
-        material,
-        inner * 1e-3,
-        None if end is None else end * 1e-3,
-        None if area is None else area * 1e-6,
-        None if moment is None else moment * 1e-12,
-    )
+    circle = np.pi / 4.0 * largest**2, np.pi / 64.0 * largest**4
+    section = table.fields(each.up_to(most) for each, most in zip(SEGMENT[5:], circle, strict=True))
+    missing = [key for key, value in section.items() if value is None]
+    if len(missing) == 1:
+        table.refuse(missing[0], "nothing", "given together with the other: area_mm2 and second_moment_mm4, or neither")
+    return BeamSegment(material=material, **told_in_si(SEGMENT, told | section))
 
 
-def _contact(table: Table) -> Contact:
-    return Contact(
-        table.quantity("translational_stiffness", CONTACT["translational_stiffness"]),
-        table.quantity("rotational_stiffness", CONTACT["rotational_stiffness"]),
-        table.quantity("translational_damping", CONTACT["translational_damping"], 0.0),
-        table.quantity("rotational_damping", CONTACT["rotational_damping"], 0.0),
-    )
+def contact_of(table: Table) -> Contact:
+    return Contact(**told_in_si(CONTACT, table.fields(CONTACT)))
 
 
 def read_campaign(folder: str | Path) -> Campaign:
@@ -263,12 +213,8 @@ def campaign_of(
         Given the table of a cut and its key ``cut`` or ``air``, or that of a hammer test and ``file``, returns the file.
     """
     top = Table(data, where, known=_CAMPAIGN)
-    head = top.table("campaign", _HEAD, {})
-    name = head.text("name", name)
-    rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
-    clock = head.number("clock_error_percent", "%", 0.0, least=-2.0, most=2.0) * 1e-2
-    depth = head.number("axial_depth_spread_mm", "mm", 0.02, least=0.0, most=1.0) * 1e-3
-    softening = head.number("speed_softening_percent", "%", 3.0, above=0.0, most=50.0) * 1e-2
+    head = top.table("campaign", keys_of(CAMPAIGN), {})
+    own = told_in_si(CAMPAIGN, head.fields(CAMPAIGN, {"name": name}))
     # hammer tests alone need neither sensors nor a workpiece
     alone = "frfs" in top and "cuts" not in top
     channels = top.table("sensors", None, {})
@@ -294,7 +240,7 @@ def campaign_of(
         if id in seen:
             raise InputError(f"{place}.id", f'"{id}", the id of {seen[id]}', "an id of its own", where)
         seen[id] = place
-    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock, tests, depth, softening)
+    return Campaign(**{"sampling_rate": None} | own, sensors=sensors, workpiece=workpiece, toolings=toolings, cuts=cuts, tests=tests)
 
 
 def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
@@ -325,38 +271,25 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
     where : str
         The file, for the messages.
     """
-    kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
+    kind = Table(data, where, f"sensors.{name}", sorted(keys_of(SENSOR)))
     quantity = Quantity(kind.text("quantity", choices=CAMPAIGN_QUANTITIES))
     trigger = quantity is Quantity.TRIGGER
-    table = Table(data, where, f"sensors.{name}", _TRIGGER if trigger else _SENSOR)
-    default = [1.0] if trigger else []
-    sensitivity = table.number("sensitivity", "signal per SI unit", *default)
-    if sensitivity == 0.0:
+    fields = [each for each in SENSOR if each.key in _TRIGGER] if trigger else [each for each in _FEELS if each.key != "axis"]
+    table = Table(data, where, f"sensors.{name}", _TRIGGER if trigger else keys_of(_FEELS))
+    told = table.fields(fields, {"sensitivity": 1.0} if trigger else None)
+    if told["sensitivity"] == 0.0:
         table.refuse("sensitivity", "0", "a number other than 0 [V/m, V/(m/s^2), V/N], 1.0 where the file is in SI")
-    angle = table.number("tooth_angle_deg", "deg", None, least=-360.0, most=360.0)
-    role = table.text("role", None, choices=tuple(Role))
-    distance = table.number("distance_behind_flange_mm", "mm", None, least=-100.0, most=300.0)
     for key in ("distance_behind_flange_mm", "distance_spread_mm"):
         if key in table and quantity is not Quantity.DISPLACEMENT:
             table.refuse(key, describe(table.data[key]), f"none of a {quantity} sensor")
-    return Sensor(
-        name,
-        quantity,
-        None if trigger else Dof(table.text("axis", choices=("X", "Y", "Z") if quantity is Quantity.FORCE else ("X", "Y")).lower()),
-        sensitivity,
-        table.number("delay_s", "s", 0.0, least=-1.0, most=1.0),
-        table.number("bandwidth_hz", "Hz", None, above=0.0),
-        table.number("pulses_per_revolution", "", 1, least=1, most=100000, whole=True),
-        None if angle is None else float(np.radians(angle)),
-        None if role is None else Role(role),
-        table.number("mount_resonance_hz", "Hz", None, above=0.0),
-        float(np.radians(table.number("rotation_deg", "deg", 0.0, least=-180.0, most=180.0))),
-        table.number("gain_spread_percent", "%", 2.0, least=0.0, most=50.0) * 1e-2,
-        table.number("cross_talk_percent", "%", 1.5, least=0.0, most=50.0) * 1e-2,
-        table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) / 1e6,
-        None if distance is None else distance * 1e-3,
-        table.number("distance_spread_mm", "mm", 1.0, least=0.0, most=100.0) * 1e-3,
-    )
+    axis = {} if trigger else {"axis": table.text("axis", choices=("X", "Y", "Z") if quantity is Quantity.FORCE else ("X", "Y"))}
+    return sensor_of_keys(name, told | axis)
+
+
+def sensor_of_keys(name: str, keys: Mapping[str, Any]) -> Sensor:
+    """Return the sensor of a channel of keys that are held to their limits."""
+    nouns: dict[str, Callable[[Any], Any]] = {"quantity": Quantity, "axis": lambda axis: Dof(axis.lower()), "role": Role}
+    return Sensor(name, **{field: nouns.get(field, lambda value: value)(value) for field, value in told_in_si(SENSOR, keys).items()})
 
 
 def _inside(folder: Path, table: Table, key: str) -> Path:

@@ -9,15 +9,15 @@ from typing import Any
 
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.settings.cutters import cutter_keys
-from rcsa_ident.io.settings.setups import SPREADS
+from rcsa_ident.io.settings.setups import material_keys, spread_keys
 from rcsa_ident.io.toml_text import toml_of
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.fields import CONTACT, keys_of
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread
 
 CONTACT_SPREADS = ("contact_stiffness_percent", "contact_damping_percent")
-_CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 
 
 def write_tooling(path: str | Path, tooling: Tooling) -> None:
@@ -49,7 +49,7 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     if tooling.spread.stated:
         data["spread"] = spread_keys(tooling.spread)
     own = {name: material for name, material in materials.items() if name not in MATERIALS}
-    return data | ({"materials": {name: _material(material) for name, material in own.items()}} if own else {})
+    return data | ({"materials": {name: material_keys(material) for name, material in own.items()}} if own else {})
 
 
 def _joined(tooling: Tooling) -> list[BeamSegment]:
@@ -74,12 +74,7 @@ def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:
 
 def contact_keys(contact: Contact) -> dict[str, float]:
     """Return a contact as `contact` of a tooling file, per metre of insertion in SI units."""
-    return {key: getattr(contact, key) for key in _CONTACT}
-
-
-def spread_keys(spread: Spread) -> dict[str, float]:
-    """Return how well a drawing is known as `spread` of a tooling file, in percent and millimetres."""
-    return {key: getattr(spread, field) / size for key, (field, size) in SPREADS.items()}
+    return {key: getattr(contact, key) for key in keys_of(CONTACT)}
 
 
 def contact_spread_keys(spread: Spread) -> dict[str, float]:
@@ -124,12 +119,3 @@ def _segment(segment: BeamSegment, names: Mapping[Material, str]) -> dict[str, A
     if segment.area is not None and segment.second_moment is not None:
         found |= {"area_mm2": 1e6 * segment.area, "second_moment_mm4": 1e12 * segment.second_moment}
     return found
-
-
-def _material(material: Material) -> dict[str, float]:
-    return {
-        "youngs_modulus_gpa": 1e-9 * material.youngs_modulus,
-        "density": material.density,
-        "poisson": material.poisson,
-        "loss_factor": material.loss_factor,
-    }

@@ -2,18 +2,11 @@
 import { card, h } from "../dom.js";
 import { quantity } from "../forms.js";
 
-const CONTACT = [
-  ["translational_stiffness", "Translational stiffness", "N/m per m"],
-  ["rotational_stiffness", "Rotational stiffness", "N m/rad per m"],
-  ["translational_damping", "Translational damping", "N s/m per m"],
-  ["rotational_damping", "Rotational damping", "N m s/rad per m"],
-];
-
-/** The card for a tooling's keys, `take(values)`, which fills it, and `write(found)`, which puts what is there into the keys to send. */
-export function contactCard(keys) {
-  const contact = CONTACT.map(([key, label, unit]) => [
+/** The card for the declared keys of a contact and those of a tooling, `take(values)`, which fills it, and `write(found)`, which puts what is there into the keys to send. */
+export function contactCard(declared, keys) {
+  const contact = declared.map(({ key, label, hint }) => [
     key,
-    quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
+    quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint }),
   ]);
   return {
     box: card(

@@ -1,23 +1,9 @@
 // The cutter's shape in the editor of a tooling: it asks only for what draws the shape that is chosen.
 import { fill, h } from "../dom.js";
 import { field, quantity, select } from "../forms.js";
+import { kindOf } from "../units.js";
 import { SHAPES } from "./tooling_start.js";
 
-// [key, label, kind, hint]
-const DIMENSIONS = [
-  ["corner_radius_mm", "Corner radius", "length", "RE"],
-  ["cutting_edge_angle_deg", "Cutting edge angle", "degree", "KAPR, from the floor to the edge"],
-  ["taper_deg", "Angle from the axis", "degree", "Taper of each side"],
-  ["largest_diameter_mm", "Largest diameter", "length", "DCX, where the edge ends"],
-  ["cutting_depth_mm", "Edge height", "length", "APMX, from the tip to its end"],
-  ["wiper_mm", "Wiper", "length", "BS, the flat beside the corner"],
-  ["profile_radius_mm", "Profile radius", "length", "Of the long arc"],
-  ["axial_distance_mm", "Axial distance", "length", "From the tip to where it is widest"],
-  ["upper_radius_mm", "Upper radius", "length", "At the edge's upper end"],
-  ["tip_diameter_mm", "Tip diameter", "length", "Of the floor; empty: a point or a ball"],
-  ["neck_diameter_mm", "Neck diameter", "length", "Behind the ball"],
-  ["tip_length_mm", "Tip length", "length", "Of the straight edge below the arc"],
-];
 // what a corner radius is of, where it is no corner that may be left out
 const CORNERS = {
   "bull-nose": "RE, from floor to wall",
@@ -65,11 +51,12 @@ const numbers = (words) =>
     .map(Number);
 const rows = (points) => (points ?? []).map((point) => point.join(" ")).join(", ");
 
-/** Fields for a cutter's shape; `write` puts what they say into the keys of a cutter. */
-export function cutterShape(keys) {
+/** Fields for a cutter's shape of the declared keys; `write` puts what they say into the keys of a cutter. */
+export function cutterShape(declared, keys) {
   const shape = select(SHAPES, keys.shape ?? "flat");
   const boxes = new Map();
-  for (const [key, label, kind, hint] of DIMENSIONS) boxes.set(key, quantity(label, kind, keys[key] ?? null, { name: `cutter.${key}`, hint }));
+  for (const { key, label, unit, hint } of declared.filter(({ label, needed }) => label && !needed))
+    boxes.set(key, quantity(label, kindOf(unit), keys[key] ?? null, { name: `cutter.${key}`, hint }));
   const points = h("textarea", { rows: 3, autocomplete: "off", spellcheck: "false", placeholder: "0 0, 5 0, 8 3 3, 8 20" });
   points.value = rows(keys.profile);
   boxes.set(

@@ -2,25 +2,20 @@
 import { h, labelled } from "../dom.js";
 import { quantityInput, u } from "../units.js";
 
-const COLUMNS = [
-  ["length_mm", "Length", null],
-  ["outer_diameter_mm", "Diameter", null],
-  ["end_diameter_mm", "End diameter", "same"],
-  ["inner_diameter_mm", "Bore", "none"],
-];
 const MATERIALS = ["carbide", "steel", "aluminium"];
 
-/** The table, `rows()`: the segments as the service wants them, `replace()` and `lengthen()`. */
-export function segmentsTable(caption, name, segments, onchange) {
+/** The table of declared keys, `rows()`: the segments as the service wants them, `replace()` and `lengthen()`. */
+export function segmentsTable(declared, caption, name, segments, onchange) {
+  const columns = declared.filter(({ label }) => label);
   const body = h("tbody", { role: "rowgroup" });
   const known = [...new Set([...MATERIALS, ...segments.map((s) => s.material)])];
   for (const segment of segments) body.append(row(segment));
   number();
 
-  function cell(tr, key, label, placeholder, segment) {
-    const input = quantityInput("length", key === "inner_diameter_mm" && segment[key] === 0 ? null : (segment[key] ?? null), {
+  function cell(tr, { key, label, hint, default: usual }, segment) {
+    const input = quantityInput("length", segment[key] === usual ? null : (segment[key] ?? null), {
       "aria-label": label,
-      placeholder: placeholder ?? "",
+      placeholder: hint,
     });
     tr.inputs[key] = input;
     return labelled(h("td", { "data-field": "", role: "cell" }, input, h("div", { class: "fault", hidden: true })), label, u("length"));
@@ -38,7 +33,7 @@ export function segmentsTable(caption, name, segments, onchange) {
     tr.inputs.material = material;
     tr.append(
       h("th", { scope: "row", role: "rowheader" }),
-      ...COLUMNS.map(([key, label, placeholder]) => cell(tr, key, label, placeholder, segment)),
+      ...columns.map((each) => cell(tr, each, segment)),
       labelled(h("td", { "data-field": "", role: "cell" }, material, h("div", { class: "fault", hidden: true })), "Material"),
       h(
         "td",
@@ -100,9 +95,9 @@ export function segmentsTable(caption, name, segments, onchange) {
 
   function values(tr) {
     const found = { ...tr.segment, material: tr.inputs.material.value };
-    for (const [key] of COLUMNS) {
+    for (const { key, needed } of columns) {
       const { base } = tr.inputs[key];
-      if (base === null && key !== "length_mm" && key !== "outer_diameter_mm") delete found[key];
+      if (base === null && !needed) delete found[key];
       else found[key] = base;
     }
     return found;
@@ -122,7 +117,7 @@ export function segmentsTable(caption, name, segments, onchange) {
           "tr",
           { role: "row" },
           h("th", { scope: "col", role: "columnheader" }, "#"),
-          COLUMNS.map(([, label]) => h("th", { scope: "col", role: "columnheader" }, label, h("span", { class: "unit" }, u("length")))),
+          columns.map(({ label }) => h("th", { scope: "col", role: "columnheader" }, label, h("span", { class: "unit" }, u("length")))),
           h("th", { scope: "col", role: "columnheader" }, "Material"),
           h("th", { scope: "col", role: "columnheader" }, h("span", { class: "unseen" }, "Change")),
         ),

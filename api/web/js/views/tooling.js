@@ -19,7 +19,7 @@ const LEAST_INSERTION = 1;
 
 export async function view({ name = "" }, query, place) {
   const from = name || query.get("from");
-  const there = from ? await get(`toolings/${part(from)}`) : null;
+  const [there, { nouns }] = await Promise.all([from ? get(`toolings/${part(from)}`) : null, get("fields")]);
   const keys = structuredClone(there?.tooling ?? START);
   const copied = from && !name;
   const title = name || (copied ? `Copy of ${from}` : "A new tooling");
@@ -32,7 +32,7 @@ export async function view({ name = "" }, query, place) {
   };
   const helix = h("input", { autocomplete: "off", placeholder: "0" });
   helix.value = [keys.cutter.helix_deg ?? 0].flat().join(", ");
-  const shape = cutterShape(keys.cutter);
+  const shape = cutterShape(nouns.cutter, keys.cutter);
   const pitch = h("input", { autocomplete: "off", placeholder: "equal" });
   pitch.value = (keys.cutter.pitch_deg ?? []).join(", ");
   const stickout = quantity("Stickout", "length", keys.tool.stickout_mm, { name: "tool.stickout_mm", hint: "Tip to the holder's face" });
@@ -40,12 +40,12 @@ export async function view({ name = "" }, query, place) {
     name: "holder.insertion_mm",
     hint: "How deep the tool sits",
   });
-  const tool = segmentsTable("Tool, from its tip", "tool.segments", keys.tool.segments, () => changed());
-  const holder = segmentsTable("Holder, from the tool to the flange", "holder.segments", keys.holder.segments, () => changed());
+  const tool = segmentsTable(nouns.segment, "Tool, from its tip", "tool.segments", keys.tool.segments, () => changed());
+  const holder = segmentsTable(nouns.segment, "Holder, from the tool to the flange", "holder.segments", keys.holder.segments, () => changed());
   const taper = h("input", { autocomplete: "off", maxlength: 200 });
   taper.value = keys.holder.taper ?? "";
-  const contact = contactCard(keys);
-  const doubts = doubtCard(keys, !name);
+  const contact = contactCard(nouns.contact, keys);
+  const doubts = doubtCard(nouns.spread, keys, !name);
 
   /** The diameter of the tool where it is clamped. */
   function shank() {

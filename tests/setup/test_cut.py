@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -14,10 +11,7 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
-from rcsa_ident.io.settings.setups import tooling_of
-from rcsa_ident.setup.machining_setup import CutSpec, Workpiece
-from rcsa_ident.workflows.identify import of_campaign
-from tests.fixtures import by_hand
+from rcsa_ident.setup.cut import CutSpec, Workpiece
 
 CUTTER = Cutter(teeth=4, diameter=0.012)
 WORKPIECE = Workpiece("of the campaign", CuttingCoefficients(902e6, 0.26, radial_edge=5e3, ratio_spread=0.07))
@@ -77,26 +71,3 @@ def test_run_out_is_the_cutters_and_belongs_to_each_tooth():
 def test_a_run_out_of_the_tooling_stays_where_the_cut_says_nothing():
     worn = Cutter(2, 0.012, runout=np.array([1e-6, -1e-6]))
     np.testing.assert_array_equal(CutSpec(coefficients=KNOWN).process(worn).cutter.runout, worn.runout)
-
-
-def test_a_campaign_remarks_on_its_toolings_its_workpiece_and_its_cuts(tmp_path):
-    """Once for all cuts that share a remark."""
-    usual = by_hand.campaign(tmp_path)
-    assert usual.remarks == ()
-    thin = tooling_of(tomllib.loads(by_hand.TOOLING.replace("inner_diameter_mm = 12.0", "inner_diameter_mm = 20.0")), "", "T1")
-    shallow = [replace(cut, conditions=replace(cut.conditions, axial_depth=4e-6)) for cut in usual.cuts]
-    soft = Workpiece("foam", CuttingCoefficients(4e7, 0.3))
-    found = replace(usual, toolings={"T1": thin}, workpiece=soft, cuts=tuple(shallow)).remarks
-    assert [remark.split(" is ")[0] for remark in found] == [
-        "T1: holder.segments[0].inner_diameter_mm",
-        "foam: tangential coefficient",
-        "T1-0 and 2 more: axial depth",
-    ]
-
-
-def test_an_identification_notes_what_is_unusual_about_its_campaign(tmp_path):
-    usual = by_hand.campaign(tmp_path)
-    odd = replace(usual, workpiece=Workpiece("foam", CuttingCoefficients(4e7, 0.3)))
-    known = by_hand.identification()
-    assert of_campaign(known, usual).notes == known.notes
-    assert of_campaign(known, odd).notes == (*known.notes, *odd.remarks)
