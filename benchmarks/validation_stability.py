@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import cache, partial
 
 import numpy as np
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 
 from benchmarks.published_modes import study
 from benchmarks.robot_milling import ALUMINIUM, LENGTH, POSTURE, PUBLISHED, SIDES, feed
@@ -18,6 +16,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.monodromy import MonodromyOperator

@@ -22,7 +22,7 @@ from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.setup.machining_setup import BareCutter, CutSpec, Tooling
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.lobes import (
