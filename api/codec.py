@@ -49,7 +49,7 @@ NOUNS = {
     "ProcessDamping": "rcsa_ident.cutting.process.ProcessDamping",
     "SpeedVariation": "rcsa_ident.cutting.process.SpeedVariation",
     "MachineText": "api.work.requests.MachineText",
-    "CutSpec": "rcsa_ident.setup.machining_setup.CutSpec",
+    "CutSpec": "rcsa_ident.setup.cut.CutSpec",
     "ToolingSource": "api.work.requests.ToolingSource",
     "LobeRequest": "api.work.requests.LobeRequest",
     "PathRequest": "api.work.paths.PathRequest",

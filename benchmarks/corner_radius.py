@@ -35,7 +35,8 @@ from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.io.settings.machines import MachineFile
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.io.settings.simulations import write_simulation
-from rcsa_ident.setup.machining_setup import Campaign, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.spread import EXACT
 from rcsa_ident.workflows.identify import identify, judge
 from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances

@@ -22,7 +22,7 @@ from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines, noise_of, thinned
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.model import receptance_at_points
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 

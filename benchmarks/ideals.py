@@ -33,7 +33,8 @@ from rcsa_ident.io.results.identifications import identification_to_json, machin
 from rcsa_ident.io.results.parts import read_result, write_result
 from rcsa_ident.io.settings.machines import STEADY, MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
-from rcsa_ident.setup.machining_setup import Campaign, Workpiece
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.virtual.changes import REFERENCE_SPEED, Changes, ChipLaw, JointChanges, Turn, Warming, changed

@@ -34,7 +34,8 @@ from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.io.settings.simulations import true_name
-from rcsa_ident.setup.machining_setup import Campaign, HammerTest, Tooling
+from rcsa_ident.setup.campaign import Campaign, HammerTest
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.virtual.rotor import frequency_response, rotor

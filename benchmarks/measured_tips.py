@@ -25,7 +25,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability import tip_modes
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes

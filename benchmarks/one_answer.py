@@ -32,7 +32,7 @@ from rcsa_ident.io.results.identifications import identification_to_json, machin
 from rcsa_ident.io.results.parts import layout, plain, read_result
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.report.summaries import advice_summary
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import ToolChange
 from tests.api.identifying import carried

@@ -22,7 +22,8 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.io.paths.tool_paths import read_tool_path
 from rcsa_ident.machine.known_tip import KnownTip
-from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import ToolPath

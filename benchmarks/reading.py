@@ -93,7 +93,7 @@ def judge(path: Path) -> str:
     from rcsa_ident.cutting.cutter import Cutter
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io.recordings.readers import read_cut
-    from rcsa_ident.setup.machining_setup import Cut
+    from rcsa_ident.setup.cut import Cut
     from rcsa_ident.signals.measurement import measure_cut
     from rcsa_ident.signals.recording import Quantity, Sensor
 

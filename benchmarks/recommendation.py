@@ -28,7 +28,8 @@ from rcsa_ident.cutting.force import CuttingCoefficients
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.machine.known_tip import KnownTip
-from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.advice import highest_removal
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes

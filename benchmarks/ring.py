@@ -25,7 +25,7 @@ from rcsa_ident.base.units import from_hz
 from rcsa_ident.identification.ring.ringing import UNKNOWNS, RungTooling, _assembly, _whole_tool, learned, prior_std
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.sound.ring_down import ring_down
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.spread import Spread

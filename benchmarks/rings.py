@@ -15,7 +15,7 @@ import numpy as np
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.dynamics.structure import Structure
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.free_modes import Motion, bare, damped_poles, rod_modes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.model import free_body

@@ -31,7 +31,7 @@ from rcsa_ident.io.recordings.readers import read_cut
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.workflows.identify import judge
 from rcsa_ident.workflows.identify_robot import identify_robot

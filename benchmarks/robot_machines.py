@@ -23,7 +23,7 @@ from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.simulations import write_robot_campaign
 from rcsa_ident.machine.robot.kinematics import postures_of
 from rcsa_ident.machine.robot.model import Body, Frame, RobotModel
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.virtual.machine import CutPlan
 from rcsa_ident.virtual.robot import VirtualRobot
 from rcsa_ident.workflows.simulate import simulate_robot

@@ -29,7 +29,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.simulations import write_simulation
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.spread import Spread
 from rcsa_ident.virtual.campaign import SimulatedCut

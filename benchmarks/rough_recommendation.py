@@ -26,7 +26,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import read_result
 from rcsa_ident.machine.machine import TipSource
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
 from rcsa_ident.workflows.advise import advise

@@ -51,7 +51,8 @@ from rcsa_ident.io.results.identifications import identification_to_json, machin
 from rcsa_ident.io.results.parts import read_result, write_result
 from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_campaign
-from rcsa_ident.setup.machining_setup import Campaign, Cut
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.workflows.identify import Method, clock_error, data_of, judge, left_out

@@ -52,7 +52,8 @@ if TYPE_CHECKING:
     from rcsa_ident.machine.known_tip import KnownTip
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
-    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+    from rcsa_ident.setup.cut import CutSpec
+    from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.signals.recording import Quantity, Sensor
     from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
     from rcsa_ident.stability.lobes import stability_lobes
@@ -154,7 +155,8 @@ _ROOMS = {
     "machine.known_tip": ("KnownTip",),
     "machine.robot.flexible": ("FlexibleRobot",),
     "machine.robot.posed_robot": ("PosedRobot",),
-    "setup.machining_setup": ("CutSpec", "Tooling"),
+    "setup.cut": ("CutSpec",),
+    "setup.tooling": ("Tooling",),
     "signals.recording": ("Quantity", "Sensor"),
     "stability.discretisation": ("FullDiscretisation", "SemiDiscretisation"),
     "stability.lobes": ("stability_lobes",),

@@ -33,7 +33,8 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.task import Task
 from rcsa_ident.io.results.identifications import identification_to_json
 from rcsa_ident.io.results.parts import check_result, layout, plain
-from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest
+from rcsa_ident.setup.campaign import Campaign, HammerTest
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import Reading, among_fellows
 from rcsa_ident.workflows.identify import ReadCut, ReadTest, data_of, hammer_lines, judge_cut, left_out, mode_deviations, of_campaign
 

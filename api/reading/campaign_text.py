@@ -17,7 +17,8 @@ from rcsa_ident.io.settings.setups import campaign_of
 from rcsa_ident.io.settings.setups import tooling_of as tooling_of_keys
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import Campaign, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.tooling import Tooling
 
 #: Role of a file that holds FRFs of hammer tests.
 HAMMER = "hammer"

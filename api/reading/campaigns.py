@@ -13,7 +13,8 @@ from api.reading.stored import Samples
 from api.stores.entities import Store
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest
+from rcsa_ident.setup.campaign import Campaign, HammerTest
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.recording import Recording
 
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]

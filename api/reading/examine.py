@@ -15,7 +15,8 @@ from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.units import to_rpm
 from rcsa_ident.io.recordings.readers import read_signals, recorded
 from rcsa_ident.report.summaries import recording_rows
-from rcsa_ident.setup.machining_setup import Campaign, Cut
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import Reading, fits_by_chance, judge_air, measure_cut
 from rcsa_ident.signals.motion import measured_axes
 from rcsa_ident.signals.recording import Recording, Sensor

@@ -17,7 +17,7 @@ from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.receptance import MeasuredCurve, assumed_of
 from rcsa_ident.io.curves.hammer import read_hammer_test
-from rcsa_ident.setup.machining_setup import HammerTest
+from rcsa_ident.setup.campaign import HammerTest
 from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.workflows.identify import hammer_lines
 

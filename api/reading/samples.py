@@ -24,7 +24,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.channels import RATE, Channel, Signals, notes_of
 from rcsa_ident.io.recordings.hdf5 import LARGEST_CHUNK
 from rcsa_ident.io.recordings.readers import in_si, read_signals, recorded
-from rcsa_ident.setup.machining_setup import Cut
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.recording import BLOCK, Quantity, Recording, Sensor
 from rcsa_ident.signals.verdict import RecordCode
 

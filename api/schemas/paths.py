@@ -15,7 +15,7 @@ from api.work.paths import PathRequest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.stock import Immersion
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.stability.methods import MethodName
 
 Millimetre = Annotated[float, Field(ge=1e-6, le=100.0)]

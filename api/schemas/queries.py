@@ -23,7 +23,7 @@ from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion
 from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 from rcsa_ident.io.settings.engagements import engagement_map_of
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.stability.methods import MethodName
 
 MOST_TOOLINGS, MOST_SPEEDS, MOST_TESTED = 12, 5000, 1000

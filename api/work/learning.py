@@ -14,7 +14,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import layout, plain
 from rcsa_ident.io.results.updated_results import taught_result
-from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest
+from rcsa_ident.setup.campaign import Campaign, HammerTest
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.recording import Recording
 
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]

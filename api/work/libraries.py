@@ -8,7 +8,7 @@ from dataclasses import replace
 from api.work.toolings import tooling_of
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.tool_libraries import Assumptions, import_tools
-from rcsa_ident.setup.machining_setup import BareCutter
+from rcsa_ident.setup.tooling import BareCutter
 
 #: Largest library [bytes], and most entries in one.
 LARGEST_LIBRARY, MOST_TOOLS = 8_000_000, 2000

@@ -26,7 +26,8 @@ from rcsa_ident.io.paths.path_tables import columns_text, milling_columns, place
 from rcsa_ident.io.paths.tool_paths import PROGRAMS, tool_path_of
 from rcsa_ident.io.settings.engagements import write_engagement
 from rcsa_ident.machine.machine import TipSource
-from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.lobes import DRAWS, method_named
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.toolpath.dexel import DexelField, Surface, memory_of

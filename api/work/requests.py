@@ -10,7 +10,8 @@ import numpy as np
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.machine.machine import TipSource
-from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.lobes import DRAWS, method_named
 from rcsa_ident.stability.zero_order import ZeroOrder

@@ -10,7 +10,7 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings import setups
 from rcsa_ident.io.settings.toolings import tooling_keys, tooling_text
 from rcsa_ident.io.toml_text import keys_of_toml
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import expected_elements
 

@@ -15,7 +15,7 @@ from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, sa
 
 if TYPE_CHECKING:
     from rcsa_ident.report.comparison import MeanForces
-    from rcsa_ident.setup.machining_setup import Campaign
+    from rcsa_ident.setup.campaign import Campaign
     from rcsa_ident.workflows.calibrate import Calibrated
 
 #: Factor from SI to the file's units.
@@ -70,7 +70,7 @@ def calibrate(
     from rcsa_ident.io.recordings.readers import read_cut
     from rcsa_ident.io.settings.dynamometer import write_workpiece
     from rcsa_ident.io.settings.setups import read_campaign
-    from rcsa_ident.setup.machining_setup import Workpiece
+    from rcsa_ident.setup.cut import Workpiece
     from rcsa_ident.workflows.calibrate import calibrate as run
 
     writable(out)
@@ -209,7 +209,7 @@ def materials(
     from rcsa_ident.cutting.materials import material
     from rcsa_ident.cutting.materials import materials as library
     from rcsa_ident.io.settings.workpieces import workpiece_keys
-    from rcsa_ident.setup.machining_setup import Workpiece
+    from rcsa_ident.setup.cut import Workpiece
 
     chosen = library() if name is None else (material(name),)
     if json_:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from rcsa_ident.cutting.stock import AskedEngagement
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.machine.machine import TipSource
-    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+    from rcsa_ident.setup.cut import CutSpec
+    from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.workflows.tool_change import ToolChange
 
 
@@ -131,7 +132,7 @@ def share_of(percent: float, option: str, most: float, above: bool = False) -> f
 
 def cut_of(cut: CutOptions, speed_variation: str | None = None) -> CutSpec:
     """Return the cut that is asked about."""
-    from rcsa_ident.setup.machining_setup import CutSpec
+    from rcsa_ident.setup.cut import CutSpec
 
     given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}
     given |= {} if cut.krc is None else {"radial_ratio": cut.krc}

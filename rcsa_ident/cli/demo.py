@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.report.html import ToolingPage
-    from rcsa_ident.setup.machining_setup import Campaign, Tooling
+    from rcsa_ident.setup.campaign import Campaign
+    from rcsa_ident.setup.tooling import Tooling
 
 #: Where predicted and true tooltip FRFs are compared [Hz].
 COMPARED = (600.0, 4000.0, 5.0)
@@ -130,7 +131,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     from rcsa_ident.machine.known_tip import measured_tip
     from rcsa_ident.report.html import ToolingPage
     from rcsa_ident.report.summaries import entries_of
-    from rcsa_ident.setup.machining_setup import CutSpec
+    from rcsa_ident.setup.cut import CutSpec
     from rcsa_ident.stability.lobes import stability_lobes
     from rcsa_ident.workflows.advise import advise
     from rcsa_ident.workflows.tool_change import ToolChange, tooltip

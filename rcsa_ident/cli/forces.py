@@ -17,7 +17,7 @@ from rcsa_ident.cli.options import Strategy
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import Machine
     from rcsa_ident.observer.wear import WearIndicators
-    from rcsa_ident.setup.machining_setup import Tooling
+    from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.signals.recording import Sensor
     from rcsa_ident.workflows.estimate_forces import MonitoredCut
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from rcsa_ident.identification.method import Method as IdentificationMethod
     from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
     from rcsa_ident.identification.result import Identification
-    from rcsa_ident.setup.machining_setup import Campaign
+    from rcsa_ident.setup.campaign import Campaign
     from rcsa_ident.signals.measurement import Reading
     from rcsa_ident.workflows.speed_bands import SpeedBand
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rcsa_ident.machine.learnt_tip import LearntTip
-    from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+    from rcsa_ident.setup.cut import CutSpec
+    from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.workflows.learn_from_cuts import Believed
 
 

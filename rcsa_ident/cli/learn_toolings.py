@@ -21,7 +21,7 @@ LARGE = 1e4
 if TYPE_CHECKING:
     from rcsa_ident.identification.hammer_lines import HammerLines
     from rcsa_ident.identification.machine import IdentifiedMachine
-    from rcsa_ident.setup.machining_setup import Campaign
+    from rcsa_ident.setup.campaign import Campaign
     from rcsa_ident.signals.measurement import Reading
     from rcsa_ident.workflows.learn_toolings import LearntToolings
 

@@ -16,7 +16,7 @@ from rcsa_ident.cli.lobes import ToolingFile
 from rcsa_ident.cli.robot import is_robot
 
 if TYPE_CHECKING:
-    from rcsa_ident.setup.machining_setup import Tooling
+    from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.toolpath.blending import Controller
     from rcsa_ident.toolpath.compensation import CompensatedPath
     from rcsa_ident.toolpath.deviation import Deviation

@@ -22,7 +22,7 @@ from rcsa_ident.stability.methods import MethodName
 
 if TYPE_CHECKING:
     from rcsa_ident.machine.machine import TipSource
-    from rcsa_ident.setup.machining_setup import Tooling
+    from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.toolpath.path import ToolPath
     from rcsa_ident.workflows.paths.milling import PathMilling
     from rcsa_ident.workflows.paths.removal import PathRemoval
@@ -180,7 +180,7 @@ def _subjects(files: list[Path], tip: TipOptions, posture: str | None) -> tuple[
 def _change(machine: TipSource, tooling: Tooling, cut: PathCutOptions, method: MethodName, bands: bool) -> ToolChange:
     import numpy as np
 
-    from rcsa_ident.setup.machining_setup import CutSpec
+    from rcsa_ident.setup.cut import CutSpec
     from rcsa_ident.stability.lobes import DRAWS, METHODS
     from rcsa_ident.workflows.tool_change import ToolChange
 

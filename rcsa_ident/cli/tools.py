@@ -206,7 +206,7 @@ def _show(entries: list[Imported]) -> None:
     from rich.table import Table
 
     from rcsa_ident.cli.tables import show
-    from rcsa_ident.setup.machining_setup import BareCutter
+    from rcsa_ident.setup.tooling import BareCutter
 
     table = Table()
     for title in ("no.", "tool", "type", "teeth", "Ø mm", "stickout + insertion mm", ""):

@@ -15,7 +15,7 @@ from rcsa_ident.identification.result import Identification, in_words
 from rcsa_ident.identification.status import Status
 from rcsa_ident.io.results.drawings import learned_of
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
-from rcsa_ident.setup.machining_setup import Campaign
+from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.learnt import LearnedValue
 from rcsa_ident.workflows.identify import left_out, mode_deviations

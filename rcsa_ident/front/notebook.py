@@ -47,7 +47,8 @@ from rcsa_ident.report.lobes import map_figure, save_figure, stability_figure, s
 from rcsa_ident.report.style import svg
 from rcsa_ident.report.summaries import drawing_rows, mode_rows, two_digits
 from rcsa_ident.report.tap import tap_figure
-from rcsa_ident.setup.machining_setup import Campaign, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.tap import TapFrf

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from threadpoolctl import threadpool_limits  # small matrices: further threads only wait, and add up in another order
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 
 if TYPE_CHECKING:
     from rcsa_ident.identification.ring.ringing import RungTooling

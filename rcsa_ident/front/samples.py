@@ -15,7 +15,7 @@ from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.io.settings.setups import CAMPAIGN_FILE, read_tooling
 from rcsa_ident.io.settings.simulations import Progress, SimulatedCampaign, write_simulation
 from rcsa_ident.machine.robot.model import RobotModel
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances, truth_speeds
 
 #: Cuts of a sample campaign that is made on the spot: three in ten of those in the repository's, and a good answer all the same.

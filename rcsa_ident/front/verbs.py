@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import rpm
-from rcsa_ident.setup.machining_setup import Campaign, Cut, CutSpec, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut, CutSpec
+from rcsa_ident.setup.tooling import Tooling
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

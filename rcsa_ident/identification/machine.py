@@ -24,7 +24,7 @@ from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machine.tip import Side
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
-from rcsa_ident.setup.machining_setup import Workpiece
+from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
 

@@ -25,7 +25,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.validation import Prediction
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
-from rcsa_ident.setup.machining_setup import Workpiece
+from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings

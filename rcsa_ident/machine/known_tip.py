@@ -16,7 +16,8 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance, assumed_of
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
-from rcsa_ident.setup.machining_setup import Tooling, Workpiece
+from rcsa_ident.setup.cut import Workpiece
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly

@@ -13,7 +13,8 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
-from rcsa_ident.setup.machining_setup import Tooling, Workpiece
+from rcsa_ident.setup.cut import Workpiece
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.label_posterior import FEWEST, LabelModel, LabelPosterior
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip

@@ -25,7 +25,8 @@ from rcsa_ident.machine.mode_synthesis import poles_of
 from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
 from rcsa_ident.machine.tip import Behind, Side, tip_over
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
-from rcsa_ident.setup.machining_setup import Tooling, Workpiece
+from rcsa_ident.setup.cut import Workpiece
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes
 from rcsa_ident.tool_holder.drawings import FittedDrawing, KnownToolings, fitted
 from rcsa_ident.tool_holder.geometry import ToolAssembly

@@ -12,7 +12,7 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.uncertain import AtNodes, Mixed, UncertainReceptance, curves_of, nodes_of
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.methods import coarse_to_fine
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly

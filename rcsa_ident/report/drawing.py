@@ -16,7 +16,7 @@ from rcsa_ident.cutting.outlines import ANGLES, in_files
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.segments import Line
 from rcsa_ident.cutting.shape import CutterShape
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import BeamSegment
 
 #: So many times the height at which the outline has come to a straight line, and so many times the radius at least; an edge that ends

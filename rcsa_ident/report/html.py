@@ -37,7 +37,9 @@ from rcsa_ident.report.summaries import (
     whole_mode_rows,
 )
 from rcsa_ident.report.workpiece_side import side_captions, side_mode_rows
-from rcsa_ident.setup.machining_setup import Campaign, CutSpec, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice
 from rcsa_ident.version import __version__

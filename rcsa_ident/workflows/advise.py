@@ -14,7 +14,7 @@ from rcsa_ident.base.plausibility import AXIAL_DEPTH, SEARCHED_DEPTH, SPINDLE_SP
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.setup.machining_setup import BareCutter
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.stability.advice import Advice, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.band_shares import BandShares, band_shares
 from rcsa_ident.stability.discretisation import FullDiscretisation

@@ -16,7 +16,8 @@ from rcsa_ident.cutting.force_axes import CLEAR, AxesChoice, axes_choices
 from rcsa_ident.cutting.force_record import ForceRecord
 from rcsa_ident.cutting.signal_fit import Dynamometer, SignalCalibration, calibrate_signal
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.setup.machining_setup import Campaign, Cut
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.spectra import Comb, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann, steady_part

@@ -9,7 +9,7 @@ from rcsa_ident.cutting.force_directions import WORTH, gain_across, lines_of, tu
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.assemble_result import ANOTHER_FEED
 from rcsa_ident.identification.diagnostics import NOTHING_JUDGES, one_axis
-from rcsa_ident.setup.machining_setup import Campaign
+from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, Reading
 
 #: Toolings that judge each other well: each is predicted by two at least.

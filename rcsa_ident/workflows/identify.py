@@ -34,7 +34,9 @@ from rcsa_ident.identification.rough_data import (
     with_scales,
 )
 from rcsa_ident.identification.workpiece_side import workpiece_side
-from rcsa_ident.setup.machining_setup import Campaign, Cut, HammerTest, Tooling
+from rcsa_ident.setup.campaign import Campaign, HammerTest
+from rcsa_ident.setup.cut import Cut
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.sweep import measure_pass

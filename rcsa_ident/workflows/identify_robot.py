@@ -22,7 +22,8 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.model_order import Report
 from rcsa_ident.identification.rough_data import without_distances
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.setup.machining_setup import Campaign, Cut
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.rods import rod_poles
 from rcsa_ident.tool_holder.spread import EXACT

@@ -16,7 +16,8 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import TipSource
-from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, learn_labels
 from rcsa_ident.stability.labels.next_test import most_telling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict

@@ -19,7 +19,8 @@ from rcsa_ident.identification.machine_prior import KnownMachine
 from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.identification.tooling_update import FurtherFit, fit_further
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.setup.machining_setup import Campaign, HammerTest, Tooling
+from rcsa_ident.setup.campaign import Campaign, HammerTest
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered, fluted_segments
 from rcsa_ident.tool_holder.geometry import ToolAssembly

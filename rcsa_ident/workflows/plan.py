@@ -27,7 +27,7 @@ from rcsa_ident.identification.experiment_design import (
 )
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.machine.speed_dependence import tips_over_speed
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, CutMeasurement
 from rcsa_ident.stability.lobes import asked_directions, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod

@@ -16,7 +16,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.sweep import WINDOW
 from rcsa_ident.workflows.plan import CutConstraints, check, limits_at

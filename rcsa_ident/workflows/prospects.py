@@ -26,7 +26,7 @@ from rcsa_ident.identification.experiment_design import (
 )
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.turning import turning_pair

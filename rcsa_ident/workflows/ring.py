@@ -10,7 +10,7 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.identification.ring.ringing import RungTooling, learned
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.sound.ring_down import RingDown, ring_down
 from rcsa_ident.signals.verdict import RecordCode
 

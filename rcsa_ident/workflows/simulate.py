@@ -11,7 +11,8 @@ import numpy as np
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.scaleout import Map
 from rcsa_ident.cutting.conditions import CuttingConditions
-from rcsa_ident.setup.machining_setup import Tooling, Workpiece
+from rcsa_ident.setup.cut import Workpiece
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.virtual.campaign import SimulatedCut, SimulatedRecord, TrueFlange, TrueReceptances
 from rcsa_ident.virtual.changes import Changes, Turn, changed, course_of
 from rcsa_ident.virtual.disturbances import Disturbances, turning

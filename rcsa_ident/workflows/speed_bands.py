@@ -14,7 +14,7 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.status import FEWEST_CUTS
-from rcsa_ident.setup.machining_setup import Campaign
+from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.workflows.identify import data_of
 

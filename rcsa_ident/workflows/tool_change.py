@@ -21,7 +21,8 @@ from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
-from rcsa_ident.setup.machining_setup import BareCutter, CutSpec, Tooling
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import BareCutter, Tooling
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, tally

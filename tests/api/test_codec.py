@@ -39,7 +39,7 @@ from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.task import Phase
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.stream_forces import LiveObserver
 

@@ -24,7 +24,7 @@ from api.stores.jobs import Job
 from api.stores.sql import open_store
 from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from tests.api.identifying import carried, uploaded
 from tests.api.in_process import POSTGRESQL, SQLITE, database, embedded
 from tests.api.in_process import service as in_this_process

@@ -12,7 +12,8 @@ from api.stores.entities import Store
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.io.curves.frf_files import Source, read_frfs, read_tapped_tip
 from rcsa_ident.machine.known_tip import KnownTip
-from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import ToolChange
 from tests.api.identifying import carried

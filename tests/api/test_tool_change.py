@@ -19,7 +19,7 @@ from rcsa_ident.identification import machine as identified
 from rcsa_ident.io.curves.tips import read_frf_csv
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.settings.setups import tooling_of
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.tool_holder.catalogue import holder
 from rcsa_ident.workflows import tool_change
 from rcsa_ident.workflows.advise import advise

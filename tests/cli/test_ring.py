@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
 from rcsa_ident.io.settings.setups import read_tooling
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from tests.fixtures.rung_tooling import rung_tooling
 
 

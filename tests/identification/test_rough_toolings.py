@@ -10,7 +10,7 @@ from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.rough_data import with_rough_toolings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.io.results.identifications import identification_to_json, machine_from_json
-from rcsa_ident.setup.machining_setup import Campaign
+from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings

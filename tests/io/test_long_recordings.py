@@ -12,7 +12,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.recordings.readers import StoredSamples, in_si, read_cut, read_recording, read_signals
-from rcsa_ident.setup.machining_setup import Cut
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import measure_cut
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording, Sensor
 from rcsa_ident.signals.steady import steady_record

@@ -15,7 +15,8 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.machine.flange_machine import FlangeMachine
-from rcsa_ident.setup.machining_setup import CutSpec, Tooling
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, fitted_modes

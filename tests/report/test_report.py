@@ -27,7 +27,9 @@ from rcsa_ident.report.figures import tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
 from rcsa_ident.report.style import svg
 from rcsa_ident.report.summaries import coefficient_rows, lobes_curves, lobes_summary, mode_rows, recording_rows, two_digits
-from rcsa_ident.setup.machining_setup import Campaign, Cut, Tooling, Workpiece
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut, Workpiece
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import RecordCode, Verdict

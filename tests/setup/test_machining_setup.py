@@ -15,7 +15,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.io.settings.setups import tooling_of
-from rcsa_ident.setup.machining_setup import CutSpec, Workpiece
+from rcsa_ident.setup.cut import CutSpec, Workpiece
 from rcsa_ident.workflows.identify import of_campaign
 from tests.fixtures import by_hand
 

@@ -12,7 +12,7 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.plausibility import PlausibilityCode
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling, tooling_of
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.proportions import edge_length
 from tests.fixtures import by_hand
 from tests.fixtures.service import example

@@ -14,7 +14,7 @@ from rcsa_ident.base.units import rpm
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.report.html import ToolCard, tool_cards_html
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import ToolChange
 from tests.api.recordings import content, declared

@@ -8,7 +8,7 @@ import pytest
 
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.io.settings.setups import read_tooling
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from tests.fixtures import by_hand
 from tests.fixtures.paths import TOOLINGS
 

@@ -14,7 +14,9 @@ from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.force_axes import axes_choices
 from rcsa_ident.cutting.signal_fit import Dynamometer, calibrate_signal
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.setup.machining_setup import Campaign, Cut, Tooling, Workpiece
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut, Workpiece
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.workflows.calibrate import calibrate, measure_force

@@ -11,7 +11,7 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.machine import TipSource
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.time_domain import TimeDomain

@@ -9,7 +9,7 @@ import pytest
 
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.setup.machining_setup import Cut
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.workflows.coverage import NOTHING_JUDGES, left_open

@@ -8,7 +8,8 @@ import pytest
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel
 from rcsa_ident.stability.labels.next_test import most_telling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict

@@ -13,7 +13,7 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves.flanges import read_flange_machine
 from rcsa_ident.io.settings.setups import tooling_of
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import ToolChange
 from tests.fixtures import by_hand

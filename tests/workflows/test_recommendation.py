@@ -14,7 +14,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.io.settings.setups import tooling_of
 from rcsa_ident.machine.known_tip import KnownTip
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.stability.advice import highest_removal
 from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.result import RESERVE

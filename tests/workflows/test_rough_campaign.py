@@ -11,7 +11,8 @@ from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import IdentificationCode
-from rcsa_ident.setup.machining_setup import HALF_NORMAL, Campaign, Cut
+from rcsa_ident.setup.campaign import HALF_NORMAL, Campaign
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.spread import SPREAD_FIELDS, Spread
 from rcsa_ident.workflows.identify import of_campaign, with_rough

@@ -12,7 +12,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.setup.machining_setup import Campaign, Cut
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor, SensorCode, untold_distances
 from rcsa_ident.signals.verdict import Verdict

@@ -18,7 +18,7 @@ from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.machine.speed_dependence import BLOCK, tips_over_speed
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.drawn_modes import of_draw
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict, tally

@@ -14,7 +14,7 @@ from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Per
 from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.machine.speed_dependence import BLOCK
 from rcsa_ident.machine.turning_machine import TurningMachine
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import drawn_limits, stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency

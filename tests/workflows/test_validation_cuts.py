@@ -10,7 +10,8 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.io.results.identifications import identification_to_json
-from rcsa_ident.setup.machining_setup import Campaign, Cut
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.workflows.identify import data_of, identify

@@ -18,7 +18,7 @@ from rcsa_ident.io.recordings.readers import read_cut
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide
-from rcsa_ident.setup.machining_setup import CutSpec
+from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.signals.recording import Role
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes

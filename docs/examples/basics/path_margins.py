@@ -16,7 +16,7 @@ import numpy as np
 import rcsa_ident as ri
 from rcsa_ident.io.paths.tool_paths import read_tool_path
 from rcsa_ident.report.part import save_coloured_part
-from rcsa_ident.setup.machining_setup import BareCutter
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.workflows.paths.removal import field_of, remove_along
 from rcsa_ident.workflows.paths.stability import cuts_along, stations_along
 from rcsa_ident.workflows.tool_change import ToolChange

@@ -16,7 +16,9 @@ from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.io.recordings.readers import read_cut
-from rcsa_ident.setup.machining_setup import BareCutter, Campaign, Cut
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Cut
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.workflows.calibrate import calibrate
 
 feeds = (300, 900, 1500)

@@ -17,7 +17,7 @@ from kept import real_files
 import rcsa_ident as ri
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.io.curves.frf_files import read_frfs
-from rcsa_ident.setup.machining_setup import Campaign, HammerTest
+from rcsa_ident.setup.campaign import Campaign, HammerTest
 from rcsa_ident.tool_holder.geometry import Material
 
 address = "https://github.com/leekunhwee/Vibration-Signal-Processing"

@@ -18,7 +18,7 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.identification.ring.line_matching import Heard, Match, Predicted, gathered, matched
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.sound.ring_down import RingDown
 from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, altered, fluted_segments
 from rcsa_ident.tool_holder.free_modes import FreeMode, Motion, bare, bending_modes, denser, rod_modes

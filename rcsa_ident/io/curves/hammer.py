@@ -19,7 +19,7 @@ from rcsa_ident.io.settings.setups import SPREADS, read_tooling
 from rcsa_ident.io.settings.toolings import CONTACT_SPREADS
 from rcsa_ident.io.toml_text import LARGEST_SETUP, one_line
 from rcsa_ident.io.validated_table import listed
-from rcsa_ident.setup.machining_setup import HammerTest
+from rcsa_ident.setup.campaign import HammerTest
 from rcsa_ident.tool_holder.geometry import Contact
 from rcsa_ident.tool_holder.spread import LARGEST_SHARE
 

@@ -13,7 +13,7 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.channels import LARGEST_DATA, Channel, Signals, StoredChannel, notes_of
 from rcsa_ident.io.files import MEGABYTE
-from rcsa_ident.setup.machining_setup import Cut
+from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.told_units import is_untold, quantity_in, volts_in
 

@@ -27,7 +27,7 @@ from rcsa_ident.io.settings.setups import sensor_of
 from rcsa_ident.io.settings.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.setup.machining_setup import Campaign
+from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
 from rcsa_ident.version import __version__

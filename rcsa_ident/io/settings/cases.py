@@ -13,7 +13,7 @@ from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.tested_cuts import read_tested_cuts
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 
 _CASE = ("name", "tooling", "feed_direction", *ENGAGEMENT_KEYS, "feed_per_tooth_mm", "tests", "idle")

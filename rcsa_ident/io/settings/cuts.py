@@ -17,7 +17,8 @@ from rcsa_ident.cutting.stock import check_cut, engagement_between, engagement_w
 from rcsa_ident.io.settings.engagements import COLUMNS as MAP_COLUMNS
 from rcsa_ident.io.settings.engagements import MOST_ROWS, engagement_map_of, read_engagement_map, rows_of_map
 from rcsa_ident.io.validated_table import Table, as_number, describe
-from rcsa_ident.setup.machining_setup import Cut, Tooling
+from rcsa_ident.setup.cut import Cut
+from rcsa_ident.setup.tooling import Tooling
 
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 _ANGLES, _SIDES, _RADIAL = ("entry_angle_deg", "exit_angle_deg"), ("y_from_mm", "y_to_mm"), ("radial_depth_mm", "strategy")

@@ -9,7 +9,7 @@ from rcsa_ident.io.files import write_text
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
 from rcsa_ident.io.toml_text import read_toml, toml_of
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import Workpiece
+from rcsa_ident.setup.cut import Workpiece
 
 
 def write_workpiece(path: str | Path, workpiece: Workpiece, remarks: Sequence[str] = ()) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import HammerTest, Tooling
+from rcsa_ident.setup.campaign import HammerTest
+from rcsa_ident.setup.tooling import Tooling
 
 HAMMER_TEST_KEYS = (
     "id",

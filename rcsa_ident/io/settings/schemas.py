@@ -22,7 +22,7 @@ from rcsa_ident.io.settings.modes import modes_of
 from rcsa_ident.io.settings.robots import robot_of
 from rcsa_ident.io.settings.setups import SPREADS, campaign_of, tooling_of
 from rcsa_ident.io.validated_table import Asked, Table, listening
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 
 #: draft-07 is what editors' TOML extensions understand.

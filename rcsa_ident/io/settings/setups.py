@@ -25,7 +25,8 @@ from rcsa_ident.io.settings.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
-from rcsa_ident.setup.machining_setup import BareCutter, Campaign, Tooling
+from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.tooling import BareCutter, Tooling
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
 from rcsa_ident.tool_holder.catalogue import assumed_contact

@@ -20,7 +20,7 @@ from rcsa_ident.io.settings.cuts import cut_keys
 from rcsa_ident.io.settings.machines import MachineFile, RobotSetup
 from rcsa_ident.io.settings.workpieces import workpiece_keys
 from rcsa_ident.io.toml_text import toml_of
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
 from rcsa_ident.virtual.changes import course_of
 from rcsa_ident.virtual.machine import CutPlan

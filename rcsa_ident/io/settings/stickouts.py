@@ -10,7 +10,7 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.setups import beam_segments, material_library, read_tooling
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import clamped
 
 #: Least insertion, in diameters of the shank: below it no clamping holds.

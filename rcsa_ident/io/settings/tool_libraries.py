@@ -29,7 +29,7 @@ from rcsa_ident.io.settings.setups import tooling_of
 from rcsa_ident.io.settings.toolings import contact_keys, contact_spread_keys, tooling_text
 from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.io.validated_table import Table, listed
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
 from rcsa_ident.tool_holder.spread import Spread

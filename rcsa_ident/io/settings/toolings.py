@@ -11,7 +11,7 @@ from rcsa_ident.io.files import write_text
 from rcsa_ident.io.settings.cutters import cutter_keys
 from rcsa_ident.io.settings.setups import SPREADS
 from rcsa_ident.io.toml_text import toml_of
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
 from rcsa_ident.tool_holder.spread import Spread

@@ -7,7 +7,7 @@ from typing import Any
 from rcsa_ident.base.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import Workpiece
+from rcsa_ident.setup.cut import Workpiece
 
 #: Edge forces of a workpiece: key and unit in N/m.
 _EDGES = {"tangential_edge_n_per_mm": 1e3, "radial_edge_n_per_mm": 1e3, "axial_edge_n_per_mm": 1e3}

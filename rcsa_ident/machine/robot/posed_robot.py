@@ -23,7 +23,7 @@ from rcsa_ident.machine.mode_synthesis import WHOLE_FLANGE
 from rcsa_ident.machine.responses import in_plane
 from rcsa_ident.machine.robot.carried_spindle import CarriedSpindle
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.rods import rod_poles

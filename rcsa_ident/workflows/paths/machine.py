@@ -7,7 +7,7 @@ import numpy as np
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import from_hz
 from rcsa_ident.machine.machine import Machine
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.tip_modes import DIRECTIONS
 from rcsa_ident.toolpath.compensation import LARGEST, CompensatedPath, Place, limited, mirrored
 from rcsa_ident.toolpath.deviation import Deviation

@@ -11,7 +11,7 @@ import numpy as np
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.shown import Shown
-from rcsa_ident.setup.machining_setup import BareCutter, Tooling
+from rcsa_ident.setup.tooling import BareCutter, Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.toolpath.dexel import DexelField, Surface, memory_of
 from rcsa_ident.toolpath.engagement import PathEngagement, engagement_along

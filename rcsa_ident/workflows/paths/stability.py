@@ -20,7 +20,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.lobes import both_directions, stability_lobes
 from rcsa_ident.stability.strength import Search, strength
 from rcsa_ident.stability.surface_error import forced_vibration, surface_location_error

@@ -12,7 +12,7 @@ from rcsa_ident.base.units import from_hz, to_hz
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.identification.ring.line_matching import gathered
 from rcsa_ident.identification.ring.ringing import MODEL_HIGHER, UNKNOWNS, learned, prior_std
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.sound.ring_down import RingDown, RingingMode
 from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.free_modes import bare, bending_modes

@@ -9,7 +9,7 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.io.paths import meshes
 from rcsa_ident.io.paths.meshes import read_mesh, write_mesh
-from rcsa_ident.setup.machining_setup import BareCutter
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.workflows.paths.removal import field_of
 from tests.toolpath.test_surface_kernels import box

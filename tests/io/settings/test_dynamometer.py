@@ -7,7 +7,7 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.io.settings.dynamometer import read_workpiece, write_workpiece
-from rcsa_ident.setup.machining_setup import Workpiece
+from rcsa_ident.setup.cut import Workpiece
 
 FOUND = CuttingCoefficients(812.3456e6, 0.2987, 0.12, 12.3e3, 9.1e3, 1.2e3, 0.013, 0.021, 0.08)
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.settings.tool_libraries import Assumptions, file_names, import_tools, read_tool_library
-from rcsa_ident.setup.machining_setup import BareCutter
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
 from tests.fixtures.tool_library import END_MILL, HSM, end_mill, inches, library

@@ -11,7 +11,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.setup.machining_setup import Workpiece
+from rcsa_ident.setup.cut import Workpiece
 
 LEAST = {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26}
 SPREADS = ("tangential_coefficient_spread_percent", "radial_ratio_spread_percent", "edge_spread_percent")

@@ -15,7 +15,8 @@ from rcsa_ident.io.settings.robots import read_robot
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
-from rcsa_ident.setup.machining_setup import BareCutter, CutSpec
+from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import ToolPath

@@ -6,7 +6,7 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.profile import Profile
-from rcsa_ident.setup.machining_setup import Tooling
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.toolpath.dexel import Surface
 from rcsa_ident.toolpath.path import RAPID, ToolPath
