@@ -14,9 +14,9 @@ import sys
 import sysconfig
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
-import rcsa_ident
 from api.system_calls import filter_calls
 
 _NO_NEW_PRIVILEGES = 38
@@ -80,7 +80,7 @@ def confine(readable: Iterable[Path] | None, writable: Iterable[Path] = ()) -> C
 def _python() -> list[Path]:
     """Where modules and their libraries are; what is imported late is still found."""
     # of a checkout that the service is started in, the packages alone: its data may stand beside them
-    own = [Path(__file__).parent, Path(rcsa_ident.__file__).parent]
+    own = [Path(spec.origin).parent for spec in map(find_spec, ("api", "rcsa_ident")) if spec is not None and spec.origin is not None]
     places = [*sys.path, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values(), "/usr/lib", "/lib", "/lib64", "/usr/share/zoneinfo"]
     # compiled kernels may lie elsewhere, as in a container
     places.append(os.environ.get("NUMBA_CACHE_DIR", ""))

@@ -17,7 +17,8 @@ import numpy as np
 
 from api.client import Client
 from benchmarks.service import serving
-from benchmarks.streaming import ENTRY, SAG, WANDER, paced, prepared
+from benchmarks.stream_crowd import prepared
+from benchmarks.streaming import ENTRY, SAG, WANDER, paced
 from tests.fixtures.turning_cut import turning_cut
 
 CHROMIUM = "/usr/bin/chromium"

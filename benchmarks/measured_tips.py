@@ -27,7 +27,7 @@ from rcsa_ident.io.settings.machines import MachineFile, read_machine
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability import tip_modes
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.tip_modes import TIP, fitted_modes

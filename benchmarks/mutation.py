@@ -1,6 +1,6 @@
 """Mutation testing: one operator, constant or comparison of a module is another, and its own tests must notice.
 
-``python -m benchmarks mutation rcsa_ident/coupling/_kernels.py`` changes one place at a time, up to ``--most`` of them, which a seed
+``python -m benchmarks mutation rcsa_ident/machine/_kernels.py`` changes one place at a time, up to ``--most`` of them, which a seed
 chooses, and runs the tests that belong to the module (``--tests``, by default those of its name under tests/) without the compiler, until
 one fails. A mutant that no test notices survives; it is printed with its line, before and after. ``--line N`` takes the mutants of a line
 alone. What survives although it changes nothing stands in ``benchmarks/mutation_equivalent.toml`` with its reason, and is not counted.
@@ -91,7 +91,7 @@ def main(arguments: list[str]) -> None:
 
 
 def own_tests(module: str) -> str:
-    """Return the file of tests that belongs to a module: of rcsa_ident/coupling/_kernels.py it is tests/coupling/test_kernels.py."""
+    """Return the file of tests that belongs to a module: of rcsa_ident/machine/_kernels.py it is tests/machine/test_kernels.py."""
     package, *rooms, name = Path(module).with_suffix("").parts
     if rooms[-1:] == ["_kernels"]:
         rooms, name = rooms[:-1], f"{name}_kernels"

@@ -24,7 +24,7 @@ from rcsa_ident.io.paths.tool_paths import read_tool_path
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import BareCutter
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.workflows.paths.milling import mill_path

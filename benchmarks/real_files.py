@@ -19,7 +19,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.io.curves.frf_files import Source, read_tap_tests
 from rcsa_ident.machine.known_tip import measured_tip
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict, tally
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod

@@ -31,7 +31,7 @@ from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.advice import highest_removal
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.operating_point import OperatingPoint
 from rcsa_ident.virtual.limit import multiplier, true_limit

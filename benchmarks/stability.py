@@ -20,7 +20,7 @@ from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflec
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.stability_map import stability_map
 from rcsa_ident.stability.tip_modes import TipModes

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from api.client import Client
+from benchmarks.observer import DATA
 from benchmarks.service import ask, serving
 from benchmarks.timing import row
 from tests.fixtures.force_stream import result
@@ -30,6 +31,28 @@ from tests.fixtures.turning_cut import turning_cut
 
 #: Seconds of a load, seconds of samples that are sent again and again, and the pause between two questions of the others [s].
 SECONDS, SAMPLES, PAUSE = 20.0, 3.0, 0.01
+
+
+def prepared(client: Client, result: str) -> str:
+    """Write machine and tooling, and return the machine's id."""
+    machine = client.make_machine("HPM sample machine").id
+    client.identify(machine, result)
+    text = (DATA / "machines" / "toolings" / "S2-PG25.toml").read_text(encoding="utf-8")
+    client.write_tooling("T1", text.replace("teeth = 4", "teeth = 2"))
+    return machine
+
+
+def hello(machine: str, rate: float, **further: Any) -> dict[str, Any]:
+    """Return the first message; signals are in SI."""
+    sensors = {
+        f"{place}_{axis}": {"quantity": quantity, "axis": axis.upper()}
+        for place, quantity in (("gap", "displacement"), ("fix", "acceleration"))
+        for axis in "xy"
+    }
+    return {
+        "machine": machine, "tooling": "T1", "spindle_speed_rpm": 12000, "sampling_rate_hz": rate, "channels": list(sensors),
+        "sensors": sensors, "begins": "air",
+    } | further  # fmt: skip
 
 
 def crowd(streams: int, per_second: float, samples: int, lonely: bool) -> list[dict[str, Any]]:
@@ -45,8 +68,6 @@ def crowd(streams: int, per_second: float, samples: int, lonely: bool) -> list[d
     lonely : bool
         Whether every second frame is left out, so that no observer begins.
     """
-    from benchmarks.streaming import hello, prepared
-
     limits = {"RCSA_IDENT_STREAMS": str(streams), "RCSA_IDENT_STREAMS_PER_GROUP": str(streams)}
     with tempfile.TemporaryDirectory() as folder, serving(Path(folder), **limits) as (port, service):
         with Client(f"http://127.0.0.1:{port}") as client:

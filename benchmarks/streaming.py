@@ -23,7 +23,7 @@ from api.client import Client
 from api.stream_client import Event, Forces, ForceStream
 from benchmarks.observer import DATA
 from benchmarks.service import serving
-from benchmarks.stream_crowd import crowd
+from benchmarks.stream_crowd import crowd, hello, prepared
 from benchmarks.timing import row
 from tests.fixtures.service import processes
 from tests.fixtures.turning_cut import TurningCut, turning_cut
@@ -56,15 +56,6 @@ def run(seconds: float = 60.0, beside: bool = True) -> list[dict[str, Any]]:
     return told(found, frames.shape[0], true, turning.rate, state)
 
 
-def prepared(client: Client, result: str) -> str:
-    """Write machine and tooling, and return the machine's id."""
-    machine = client.make_machine("HPM sample machine").id
-    client.identify(machine, result)
-    text = (DATA / "machines" / "toolings" / "S2-PG25.toml").read_text(encoding="utf-8")
-    client.write_tooling("T1", text.replace("teeth = 4", "teeth = 2"))
-    return machine
-
-
 def result_text() -> str:
     """RESULT.json of the sample runs; RCSA_IDENT_OBSERVER_RESULT names one that is there."""
     given = os.environ.get("RCSA_IDENT_OBSERVER_RESULT")
@@ -90,19 +81,6 @@ def begun(client: Client, machine: str) -> list[str]:
         time.sleep(0.2)
     time.sleep(5.0)
     return jobs
-
-
-def hello(machine: str, rate: float, **further: Any) -> dict[str, Any]:
-    """Return the first message; signals are in SI."""
-    sensors = {
-        f"{place}_{axis}": {"quantity": quantity, "axis": axis.upper()}
-        for place, quantity in (("gap", "displacement"), ("fix", "acceleration"))
-        for axis in "xy"
-    }
-    return {
-        "machine": machine, "tooling": "T1", "spindle_speed_rpm": 12000, "sampling_rate_hz": rate, "channels": list(sensors),
-        "sensors": sensors, "begins": "air",
-    } | further  # fmt: skip
 
 
 def paced(port: int, service: int, machine: str, turning: TurningCut, frames: np.ndarray) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import scipy.linalg
 
 from benchmarks.forces import closed_lines, cylinder_lines
 from benchmarks.removal import FLAT, beside, cuts, leaning_turns
-from benchmarks.validation import Case, Measure
+from benchmarks.validation_case import Case, Measure
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.cutting.calibration import mean_force_matrix
 from rcsa_ident.cutting.coefficients import CuttingCoefficients

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import dynamometer, labelled_cuts, real_files, real_machine, recordings
-from benchmarks.validation import Case, Measure
+from benchmarks.validation_case import Case, Measure
 from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.io.recordings.readers import read_cut

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks import compensation, real_machine
 from benchmarks.removal import BALL, beside, cuts, leaning_turns
 from benchmarks.robot_milling import ALUMINIUM, LENGTH, POSTURE, PUBLISHED, SIDES, feed
-from benchmarks.validation import Case, Measure
+from benchmarks.validation_case import Case, Measure
 from benchmarks.validation_files import CUTS, FILES, HAMMER, calibrated
 from benchmarks.validation_stability import peak, robot_row
 from benchmarks.validation_study import MISSED

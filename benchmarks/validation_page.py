@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.validation import GROUPS
+from benchmarks.validation_case import GROUPS
 from benchmarks.validation_missed import WORDS
 
 MISSED = "Not reproduced"

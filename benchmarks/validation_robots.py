@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.compensation import POSTURE, tight
 from benchmarks.robot import GRAVITY, pinocchio
-from benchmarks.validation import Case, Measure
+from benchmarks.validation_case import Case, Measure
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.identification.arm.design import Reach, payload_mass, plan_postures

@@ -9,20 +9,19 @@ import numpy as np
 from benchmarks.published_modes import study
 from benchmarks.robot_milling import ALUMINIUM, LENGTH, POSTURE, PUBLISHED, SIDES, feed
 from benchmarks.robot_milling import row as table_row
-from benchmarks.validation import Case, Measure
+from benchmarks.validation_case import Case, Measure
 from rcsa_ident.cutting.deflection import deflected_edge, deflected_process
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.front.samples import sample_robot
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.multiplier_limits import longest_step
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.toolpath.march import mill_block

@@ -11,7 +11,8 @@ import control
 import numpy as np
 import scipy.linalg
 
-from benchmarks.validation import ROOT, Case, Measure
+from benchmarks.page import DOCS
+from benchmarks.validation_case import Case, Measure
 from rcsa_ident.coupling.assembly import assemble
 from rcsa_ident.coupling.decoupling import decouple
 from rcsa_ident.coupling.rcsa import couple
@@ -32,7 +33,7 @@ from tests.oracles import analytic, literature, naive, ross_table
 from tests.tool_holder import exact_rods, test_model, test_rods, test_turning
 from tests.virtual import test_rotor
 
-ROSS = ROOT / "tests" / "oracles" / "ross_free_free.csv"
+ROSS = DOCS.parent / "tests" / "oracles" / "ross_free_free.csv"
 
 
 def beam_frequencies(name: str) -> np.ndarray:

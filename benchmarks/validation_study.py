@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.page import DOCS, read_rows
 from benchmarks.rough import KINDS
 from benchmarks.study_table import AIMS, COUPLED_AIMS, COUPLED_WORST, CROSS_AIM, WORST
-from benchmarks.validation import Case, Measure
+from benchmarks.validation_case import Case, Measure
 
 AIM = "aim of the study"
 #: Name of the condition in words.

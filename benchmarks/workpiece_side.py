@@ -37,7 +37,7 @@ from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.io.settings.stickouts import read_stickouts
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.virtual.reduction import poles, reduced

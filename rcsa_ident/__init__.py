@@ -55,10 +55,9 @@ if TYPE_CHECKING:
     from rcsa_ident.setup.cut import CutSpec
     from rcsa_ident.setup.tooling import Tooling
     from rcsa_ident.signals.recording import Quantity, Sensor
-    from rcsa_ident.stability.full_discretisation import FullDiscretisation
+    from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
     from rcsa_ident.stability.lobes import stability_lobes
     from rcsa_ident.stability.multi_frequency import MultiFrequency
-    from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
     from rcsa_ident.stability.stability_map import stability_map
     from rcsa_ident.stability.surface_error import surface_location_error
     from rcsa_ident.stability.time_domain import TimeDomain
@@ -159,10 +158,9 @@ _ROOMS = {
     "setup.cut": ("CutSpec",),
     "setup.tooling": ("Tooling",),
     "signals.recording": ("Quantity", "Sensor"),
-    "stability.full_discretisation": ("FullDiscretisation",),
+    "stability.discretisation": ("FullDiscretisation", "SemiDiscretisation"),
     "stability.lobes": ("stability_lobes",),
     "stability.multi_frequency": ("MultiFrequency",),
-    "stability.semi_discretisation": ("SemiDiscretisation",),
     "stability.stability_map": ("stability_map",),
     "stability.surface_error": ("surface_location_error",),
     "stability.time_domain": ("TimeDomain",),

@@ -24,8 +24,11 @@ from rcsa_ident.signals.sweep import judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.identify import read_of
 
-#: A campaign's files come one after the other, each with its whole text.
-_declared = lru_cache(4)(campaign_of_text)
+
+@lru_cache(maxsize=4)
+def _declared(text: str) -> Campaign:
+    """A campaign's files come one after the other, each with its whole text."""
+    return campaign_of_text(text)
 
 
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:

@@ -28,8 +28,7 @@ from rcsa_ident.io.settings.engagements import write_engagement
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.lobes import DRAWS
-from rcsa_ident.stability.methods import method_named
+from rcsa_ident.stability.lobes import DRAWS, method_named
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.toolpath.dexel import DexelField, Surface, memory_of
 from rcsa_ident.toolpath.path import ToolPath
@@ -66,7 +65,7 @@ class PathRequest:
         Of the spindle, where the path has none.
     cut : CutSpec
     method : str
-        One of `stability.methods.METHODS`.
+        One of `stability.lobes.METHODS`.
     bands, play, weight : bool
     turn_steps : int
     cutoff : float [m]

@@ -13,8 +13,7 @@ from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.lobes import DRAWS
-from rcsa_ident.stability.methods import method_named
+from rcsa_ident.stability.lobes import DRAWS, method_named
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tool_change import ToolChange
 
@@ -105,7 +104,7 @@ class LobeRequest:
     speeds : tuple of float [rad/s], rising
     max_depth : float [m]
     method : str
-        One of `stability.methods.METHODS`.
+        One of `stability.lobes.METHODS`.
     bands : bool
     stiffness_spread : float
     work_seconds : float [s]

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-# by name and late: whoever computes needs neither figures nor files
+# by name and late: whoever computes needs neither figures nor files; an import, even a late one, would have every module reach every other
 _DOOR = "rcsa_ident.front.notebook"
 
 

@@ -189,7 +189,7 @@ def _name_tests(
     from rcsa_ident.cli.learn import believed_of
     from rcsa_ident.io.settings.tested_cuts import read_candidates
     from rcsa_ident.stability.labels.tested_cuts import TestedCuts
-    from rcsa_ident.stability.methods import METHODS
+    from rcsa_ident.stability.lobes import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts, next_tests
 
     spec = cut_of(cut)

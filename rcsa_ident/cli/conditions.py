@@ -109,8 +109,7 @@ def frf_source(text: str) -> Any:
 
 def change_of(machine: TipSource, tooling: Tooling, cut: CutSpec, speeds: SpeedOptions, bands: bool, stiffness_spread: float) -> ToolChange:
     """Return what is asked about a tooling."""
-    from rcsa_ident.stability.lobes import DRAWS
-    from rcsa_ident.stability.methods import METHODS
+    from rcsa_ident.stability.lobes import DRAWS, METHODS
     from rcsa_ident.workflows.tool_change import ToolChange
 
     draws, share = (DRAWS if bands else 0), share_of(stiffness_spread, "--stiffness-spread", 50.0)

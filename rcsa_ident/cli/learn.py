@@ -98,7 +98,7 @@ def learn(
     from rcsa_ident.io.results.learnt_tips import believed as told
     from rcsa_ident.io.results.learnt_tips import write_learnt_tip
     from rcsa_ident.io.settings.tested_cuts import read_tested_cuts
-    from rcsa_ident.stability.methods import METHODS
+    from rcsa_ident.stability.lobes import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts
 
     if toolings is not None:

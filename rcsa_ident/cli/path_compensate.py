@@ -210,13 +210,13 @@ def _on_arm(
 ) -> tuple[CompensatedPath, list[str]]:
     import numpy as np
 
-    from rcsa_ident.cli.robot import _angles, _arm, _found
+    from rcsa_ident.cli.robot import arm_of, joint_angles, posterior_of
     from rcsa_ident.workflows.paths.robot import IdealForce, Mirror, RobotPath, compensate
 
-    posterior = _found(machine, joints_only)
-    robot = _arm(machine, joints_only) if posterior is None else posterior.arm
+    posterior = posterior_of(machine, joints_only)
+    robot = arm_of(machine, joints_only) if posterior is None else posterior.arm
     others = () if posterior is None or not draws else posterior.draws(draws, np.random.default_rng(seed))
-    task = RobotPath(robot, _angles(posture, robot), tool.assembly, along, force, controller, weight)
+    task = RobotPath(robot, joint_angles(posture, robot), tool.assembly, along, force, controller, weight)
     name, passes = method
     found = compensate(task, IdealForce() if name is MethodName.ideal_force else Mirror(passes), largest, others)
     said = list(robot.model.warnings)

@@ -181,8 +181,7 @@ def _change(machine: TipSource, tooling: Tooling, cut: PathCutOptions, method: M
     import numpy as np
 
     from rcsa_ident.setup.cut import CutSpec
-    from rcsa_ident.stability.lobes import DRAWS
-    from rcsa_ident.stability.methods import METHODS
+    from rcsa_ident.stability.lobes import DRAWS, METHODS
     from rcsa_ident.workflows.tool_change import ToolChange
 
     given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}

@@ -30,12 +30,10 @@ def ring(
     json_: Json = False,
 ) -> None:
     """Learn what a drawing does not tell from the ring of the tooling: hang it on a string, tap it, hold a phone beside it."""
+    from rcsa_ident.front.recorded import ring as ask
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.io.recordings.open_recording import open_recording
-    from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.io.settings.toolings import tooling_keys, tooling_text
     from rcsa_ident.report.ring_rows import ring_row, sentences
-    from rcsa_ident.workflows.ring import ring_tooling
 
     writable(out)
     if plot is not None:
@@ -43,9 +41,7 @@ def ring(
     if out.exists() and tooling.exists() and out.samefile(tooling):
         raise InputError("--out", "the drawing itself", "another file: a drawing is not overwritten", str(out))
     with Stages(quiet=json_).stage("listening"):
-        drawn = read_tooling(tooling)
-        heard, alone = ([open_recording(path, (), rate_hz) for path in paths or ()] for paths in (sounds, bare_tool))
-        found = ring_tooling(drawn, heard, alone, None if mass_g is None else 1e-3 * mass_g)
+        found = ask(tooling, *(sounds or ()), bare_tool=bare_tool or (), mass=None if mass_g is None else 1e-3 * mass_g, rate=rate_hz)
     said = sentences(found)
     write_text(out, tooling_text(tooling_keys(found.after), [f"learned from its ring, from {tooling.name}", *said]))
     if plot is not None:

@@ -54,8 +54,8 @@ def check(
 
     from rcsa_ident.workflows.robot_postures import at_posture
 
-    arm = _arm(robot, joints_only)
-    angles = np.zeros(len(arm.model.joints)) if posture is None else _angles(posture, arm)
+    arm = arm_of(robot, joints_only)
+    angles = np.zeros(len(arm.model.joints)) if posture is None else joint_angles(posture, arm)
     found = at_posture(arm, angles)
     warnings = [*arm.model.beyond_limits(angles), *arm.model.warnings]
     if json_:
@@ -193,15 +193,15 @@ def map_(
     say(f"written: {out} ({len(along)} places, {change.speeds.size} speeds, {stages.seconds['limits']:.2f} s)")
 
 
-def _arm(path: Path, joints_only: bool) -> FlexibleRobot:
+def arm_of(path: Path, joints_only: bool) -> FlexibleRobot:
     from rcsa_ident.io.settings.robots import read_robot
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
 
-    found = _found(path, joints_only)
+    found = posterior_of(path, joints_only)
     return FlexibleRobot(read_robot(path), tilts=not joints_only) if found is None else found.arm
 
 
-def _found(path: Path, joints_only: bool) -> RobotPosterior | None:
+def posterior_of(path: Path, joints_only: bool) -> RobotPosterior | None:
     """What cuts have told of a robot, where the file is RESULT.json."""
     if path.suffix.lower() != ".json":
         return None
@@ -225,14 +225,14 @@ def posed_robot(path: Path, posture: str, joints_only: bool) -> PosedRobot:
     """Return an arm of a file at a posture that an option names."""
     from rcsa_ident.machine.robot.posed_robot import PosedRobot
 
-    found = _found(path, joints_only)
+    found = posterior_of(path, joints_only)
     if found is not None:
-        return found.at(_angles(posture, found.arm))
-    arm = _arm(path, joints_only)
-    return PosedRobot(arm, _angles(posture, arm))
+        return found.at(joint_angles(posture, found.arm))
+    arm = arm_of(path, joints_only)
+    return PosedRobot(arm, joint_angles(posture, arm))
 
 
-def _angles(text: str, arm: FlexibleRobot) -> FloatArray:
+def joint_angles(text: str, arm: FlexibleRobot) -> FloatArray:
     """The posture of an option, in radians."""
     import numpy as np
 

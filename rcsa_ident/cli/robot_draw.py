@@ -9,7 +9,7 @@ import typer
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
-from rcsa_ident.cli.robot import Posture, RobotFile, _angles, _arm
+from rcsa_ident.cli.robot import Posture, RobotFile, arm_of, joint_angles
 
 if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray
@@ -45,8 +45,8 @@ def draw(
     from rcsa_ident.report.robot_drawing import arm_svg
 
     writable(out)
-    flexible = _arm(robot, False)
-    arm, angles = flexible.model, _angles(posture, flexible)
+    flexible = arm_of(robot, False)
+    arm, angles = flexible.model, joint_angles(posture, flexible)
     assembly = None if tooling is None else read_tooling(tooling).assembly
     places: FloatArray | None = None
     ends: list[FloatArray] = []

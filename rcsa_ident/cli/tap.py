@@ -60,11 +60,9 @@ def tap(
     json_: Json = False,
 ) -> None:
     """Average hits of a hammer to a receptance; double hits, overloads and others that do not fit are left out and named."""
+    from rcsa_ident.front.recorded import tap as ask
     from rcsa_ident.io.curves.exports import TAP_SUFFIXES, write_tap
-    from rcsa_ident.io.recordings.open_recording import open_recording
     from rcsa_ident.report.summaries import tap_row
-    from rcsa_ident.signals.tap import HitEstimator
-    from rcsa_ident.workflows.tap import tap_recordings
 
     writable(out)
     if out.suffix.lower() not in TAP_SUFFIXES:
@@ -72,10 +70,19 @@ def tap(
     if plot is not None:
         writable(plot, "--plot")
     mass = 1e-3 * non_negative("--sensor-mass-g", sensor_mass_g, "g")
-    wanted = [name for name in (force, response) if name]
-    opened = [open_recording(path, wanted, rate_hz) for path in hits]
-    gains = force_sensitivity, response_sensitivity
-    found = tap_recordings(opened, force, response, quantity.value, HitEstimator(estimator), mass, axis.value, *gains, reverse)
+    found = ask(
+        *hits,
+        force=force,
+        response=response,
+        quantity=quantity.value,
+        estimator=estimator.value,
+        sensor_mass=mass,
+        axis=axis.value,
+        rate=rate_hz,
+        force_sensitivity=force_sensitivity,
+        response_sensitivity=response_sensitivity,
+        reverse=reverse,
+    )
     write_tap(out, found)
     if plot is not None:
         from rcsa_ident.report.tap import tap_figure

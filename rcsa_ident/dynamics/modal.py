@@ -11,9 +11,8 @@ import numpy as np
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Shown
-from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.poles import PoleResidue, frequencies, pair_sum
+from rcsa_ident.dynamics.poles import PoleResidue, frequencies, pair_sum, pole_sum
 from rcsa_ident.dynamics.receptance import Receptance
 
 _FREQUENCIES = "finite natural frequencies above 0 [rad/s]"
@@ -50,7 +49,7 @@ class PoleModel:
         omega = frozen(omega)
         p, m = self.outputs.shape
         residues = np.einsum("pk,kq->kpq", self.outputs, self.inputs).reshape(m, p * p)
-        values = pole_sum(omega, self.pole, np.ascontiguousarray(residues)).reshape(omega.size, p, p)
+        values = pole_sum(omega, self.pole, residues).reshape(omega.size, p, p)
         return Receptance(omega, values, self.coordinates, self.coordinates)
 
     def entries(self, omega: FloatArray, places: Sequence[tuple[int, int]]) -> ComplexArray:
@@ -58,8 +57,7 @@ class PoleModel:
         rows, columns = np.array(places).T
         # the very products that `receptance` makes: near-rigid poles come in pairs that cancel to seven digits
         residues = np.einsum("pk,kq->kpq", self.outputs, self.inputs)[:, rows, columns]
-        found: ComplexArray = pole_sum(frozen(omega), self.pole, np.ascontiguousarray(residues)).T
-        return found
+        return pole_sum(omega, self.pole, residues).T
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -12,7 +12,7 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_hz
-from rcsa_ident.dynamics._kernels import pole_sum
+from rcsa_ident.dynamics import _kernels
 from rcsa_ident.dynamics.state_space import StateSpace
 
 #: Condition number of the eigenvectors beyond which poles are taken to coincide.
@@ -137,6 +137,12 @@ class PoleResidue(Shown):
         return self.state_space().to_control(inputs, outputs)
 
 
+def pole_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> ComplexArray:
+    """Return sum_k residue_k / (i omega - pole_k), shape (n, g), of residues of shape (m, g)."""
+    found: ComplexArray = _kernels.pole_sum(frozen(omega), frozen(pole, complex), np.ascontiguousarray(residue))
+    return found
+
+
 def pair_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> ComplexArray:
     """Return sum_k residue_k / (i omega - pole_k) + conj(residue_k) / (i omega - conj(pole_k)), shape (n, r, c).
 
@@ -147,10 +153,8 @@ def pair_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> Co
     residue : complex array, shape (m, r, c)
     """
     m, r, c = residue.shape
-    flat = np.ascontiguousarray(residue.reshape(m, r * c))
-    values = pole_sum(frozen(omega), frozen(np.concatenate([pole, pole.conj()]), complex), np.concatenate([flat, flat.conj()]))
-    found: ComplexArray = values.reshape(-1, r, c)
-    return found
+    flat = residue.reshape(m, r * c)
+    return pole_sum(omega, np.concatenate([pole, pole.conj()]), np.concatenate([flat, flat.conj()])).reshape(-1, r, c)
 
 
 def frequencies(what: str, omega: FloatArray, most: int = 8) -> str:

@@ -44,6 +44,7 @@ from rcsa_ident.report.forces import force_history
 from rcsa_ident.report.html import report_html
 from rcsa_ident.report.listening import listening_figure
 from rcsa_ident.report.lobes import map_figure, save_figure, stability_figure, surface_figure
+from rcsa_ident.report.style import svg
 from rcsa_ident.report.summaries import drawing_rows, mode_rows, two_digits
 from rcsa_ident.report.tap import tap_figure
 from rcsa_ident.setup.campaign import Campaign
@@ -325,7 +326,7 @@ def _page(noun: Shown, *parts: str) -> str:
 
 
 def _svg(figure: Figure) -> str:
-    return figures.svg(figure, f"rcsa-ident-{next(_NUMBER)}")
+    return svg(figure, f"rcsa-ident-{next(_NUMBER)}")
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

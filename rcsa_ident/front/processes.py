@@ -77,14 +77,6 @@ class Relay:
         return Relay, ()
 
 
-def _with_line(relay: Relay) -> tuple[type[Relay], tuple[None, Connection | None]]:
-    return Relay, (None, None if relay.line is None or relay.line.closed else relay.line)
-
-
-# what multiprocessing itself sends to its workers may hold a connection
-ForkingPickler.register(Relay, _with_line)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Workers:
     """A `map` that may run in several processes; results come in the order of the tasks.
@@ -165,7 +157,12 @@ class _Parcel(ForkingPickler):
     """A pickler that refuses what only the running script defines: the helpers could not find it."""
 
     def reducer_override(self, obj: Any) -> Any:
-        """Look at each function and class by the way, as the pickler will name it, and leave the work to the pickler."""
+        """Look at each function and class by the way, as the pickler will name it, and leave the work to the pickler.
+
+        What multiprocessing itself sends may hold a connection: a relay keeps its line.
+        """
+        if isinstance(obj, Relay):
+            return Relay, (None, None if obj.line is None or obj.line.closed else obj.line)
         if isinstance(obj, type | FunctionType) and obj.__module__ in _SCRIPT:
             raise _Unsendable(f"{obj.__qualname__} is defined in the script that runs, which the helpers do not run")
         return NotImplemented

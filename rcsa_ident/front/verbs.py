@@ -10,7 +10,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -428,20 +427,21 @@ def connect(url: str = "http://127.0.0.1:8000", key: str | None = None) -> Any:
     ...     print(type(client).__name__)
     Client
     """
-    # by name and late: the library knows nothing of the service (an import contract), only this door opens to it
+    # late: of the library only this door opens to the service, as its import contract says
     try:
-        service = import_module("api")
+        import api
     except ImportError:
         raise InputError("api", "no such package", "this package as it is installed, with its service") from None
-    if getattr(service, "DISTRIBUTION", None) != "rcsa-ident":
-        where = str(getattr(service, "__file__", None) or "")
+    if getattr(api, "DISTRIBUTION", None) != "rcsa-ident":
+        where = str(getattr(api, "__file__", None) or "")
         raise InputError("api", "a package of that name from elsewhere", "the one that rcsa-ident installs, in front of it", where)
     try:
-        return import_module("api.client").Client(url, key)
+        from api.client import Client
     except ImportError as error:
         if error.name is None or error.name.split(".")[0] in ("api", "rcsa_ident"):
             raise
         raise InputError("client", f"no {error.name}", "the extra `client`: pip install 'rcsa-ident[client]'") from None
+    return Client(url, key)
 
 
 @contextmanager

@@ -14,9 +14,9 @@ import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.coupling._kernels import changes_of_planes, tip_changes, tips_of_planes, tips_over
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import Doubted, Places, UncertainReceptance, Variation
+from rcsa_ident.machine._kernels import changes_of_planes, tip_changes, tips_of_planes, tips_over
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.drawings import FittedDrawing
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
@@ -194,7 +194,7 @@ class PlaneHolder:
     ----------
     tip_tip : complex array, shape (n,)
     flange, carried : complex arrays, shape (3, n)
-        As `rcsa_ident.coupling._kernels.tips_over` takes them.
+        As `rcsa_ident.machine._kernels.tips_over` takes them.
     """
 
     tip_tip: ComplexArray

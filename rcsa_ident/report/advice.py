@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import to_cm3_per_min, to_rpm
-from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid, letters
-from rcsa_ident.report.lobes import _CURVES, _GREEN, _RED, stability_figure
+from rcsa_ident.report.lobes import stability_figure
+from rcsa_ident.report.style import COLOURS, CURVES, GREEN, RED, STYLE, TRUTH, figure_grid, letters
 from rcsa_ident.stability.advice import Advice, PlannedCut, UsableDepths
 from rcsa_ident.stability.operating_point import OperatingPoint
 
@@ -42,12 +42,12 @@ def usable_figure(
     common : array, shape (n,) [m], optional
         What is stable on all machines that are consistent with the recordings.
     """
-    figure, grid = _grid(2, 1, 5.2, (2.0, 1.0), sharey="none")
+    figure, grid = figure_grid(2, 1, 5.2, (2.0, 1.0), sharey="none")
     top, bottom = grid[:, 0]
     speed = to_rpm(depths.spindle_speed)
     limit, depth = 1e3 * depths.limit, 1e3 * depths.depth
     ceiling = 1.18 * float(max(limit.max(), *(1e3 * mark.depth for mark in planned), 1e-6))
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         top.fill_between(speed, 0.0, depth, color="#009E73", alpha=0.16, lw=0, label="recommended depth")
         top.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
         for values, colour, name in ((depths.by_power, "#CC79A7", "power"), (depths.by_torque, "#8c6d00", "torque")):
@@ -56,11 +56,11 @@ def usable_figure(
                 top.plot(speed, np.where(curve < ceiling, curve, np.nan), color=colour, lw=1.3, label=f"limited by {name}")
                 top.fill_between(speed, np.minimum(curve, limit), limit, color=colour, alpha=0.13, lw=0)
         if common is not None:
-            top.plot(speed, 1e3 * common, ":", color=_TRUTH, lw=1.2, label="stable on all machines consistent with the recordings")
+            top.plot(speed, 1e3 * common, ":", color=TRUTH, lw=1.2, label="stable on all machines consistent with the recordings")
         if np.any(np.abs(depths.stable - depths.limit) > 1e-9):
-            top.plot(speed, 1e3 * depths.stable, color=_GREEN, lw=1.1, label="recommended depth by stability alone")
+            top.plot(speed, 1e3 * depths.stable, color=GREEN, lw=1.1, label="recommended depth by stability alone")
         top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
-        for group, marker, colour, name in ((marks, "v", _GREEN, "recommended"), (planned, "s", _RED, "planned")):
+        for group, marker, colour, name in ((marks, "v", GREEN, "recommended"), (planned, "s", RED, "planned")):
             for i, mark in enumerate(group):
                 x, y = to_rpm(mark.spindle_speed), 1e3 * mark.depth
                 if mark.depth < np.inf:
@@ -70,7 +70,7 @@ def usable_figure(
         top.set_ylim(0.0, ceiling)
         top.set_ylabel("axial depth [mm]")
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=9.0, frameon=False)
-        bottom.plot(speed, to_cm3_per_min(depths.removal), color=_GREEN)
+        bottom.plot(speed, to_cm3_per_min(depths.removal), color=GREEN)
         bottom.set_ylim(bottom=0.0)
         bottom.set_ylabel("removal rate [cm³/min]")
         bottom.set_xlabel("spindle speed [rev/min]")
@@ -126,11 +126,11 @@ def comparison_figure(curves: Mapping[str, UsableDepths], marks: Mapping[str, Ma
     marks : mapping of name to Mark
         The best cut of each.
     """
-    figure, grid = _grid(2, 1, 5.6, (1.4, 1.0), sharey="none")
+    figure, grid = figure_grid(2, 1, 5.6, (1.4, 1.0), sharey="none")
     top, bottom = grid[:, 0]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         for i, (name, depths) in enumerate(curves.items()):
-            colour, dashes = _CURVES[i % len(_CURVES)], ("-", "--", ":")[i // len(_CURVES) % 3]
+            colour, dashes = CURVES[i % len(CURVES)], ("-", "--", ":")[i // len(CURVES) % 3]
             speed = to_rpm(depths.spindle_speed)
             top.plot(speed, 1e3 * depths.limit, dashes, color=colour, lw=0.8, alpha=0.6)
             top.plot(speed, 1e3 * depths.depth, dashes, color=colour, label=letters(name))

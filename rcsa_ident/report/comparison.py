@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.report.figures import _STYLE, COLOURS
+from rcsa_ident.report.style import COLOURS, STYLE
 
 _HAMMER = "#1f2933"
 _FORCE_COLOURS = ("#0072B2", "#C8501A", "#009E73")
@@ -23,7 +23,7 @@ _View = Callable[[ComplexArray], FloatArray]
 
 def save(figure: Figure, path: str | Path) -> None:
     """Write a figure; the suffix says the format (png, svg, pdf)."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure.savefig(path, dpi=150, facecolor="white")
 
 
@@ -51,7 +51,7 @@ class MeanForces:
 
 def mean_forces(groups: Sequence[MeanForces]) -> Figure:
     """Measured mean forces over the feed per tooth with the regression's lines, a column for each group."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(max(5.6, 4.2 * len(groups)), 3.8), layout="constrained")
         grid = figure.subplots(1, len(groups), squeeze=False, sharey=True)
         for ax, group in zip(grid[0], groups, strict=True):
@@ -121,7 +121,7 @@ def frf_comparison(
     """
     correlated = any(pair.correlation is not None for pair in pairs)
     rows, ratios = (3, (1.6, 1.0, 0.6)) if correlated else (2, (1.6, 1.0))
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(max(5.2, 4.3 * len(pairs) + 0.8), 2.0 * sum(ratios) + 0.9), layout="constrained")
         grid = figure.subplots(rows, len(pairs), sharex="col", squeeze=False, height_ratios=ratios)
         for column, pair in zip(grid.T, pairs, strict=True):
@@ -219,7 +219,7 @@ def flange_comparison(pair: FlangePair) -> Figure:
     """The three independent entries of the uncoupled spindle's flange, magnitude and phase."""
     entries = (((0, 0), "h_tF [m/N]"), ((0, 1), "h_tM = h_rF [rad/N]"), ((1, 1), "h_rM [rad/(N m)]"))
     usual = ("#1f2933", "#0072B2", "#C8501A")
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 4.8), layout="constrained")
         grid = figure.subplots(2, 3, sharex=True, squeeze=False, height_ratios=(1.6, 1.0))
         for column, ((i, j), label) in zip(grid.T, entries, strict=True):

@@ -12,8 +12,8 @@ from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.report.figures import _STYLE, COLOURS, _grid, _without_jumps, letters, tooltip_frf, wide
-from rcsa_ident.report.lobes import _CURVES
+from rcsa_ident.report.figures import tooltip_frf
+from rcsa_ident.report.style import COLOURS, CURVES, STYLE, figure_grid, letters, wide, without_jumps
 from rcsa_ident.report.summaries import entries_of
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.stability.tip_modes import TIP
@@ -69,14 +69,14 @@ def receptance_figure(receptance: Receptance, slopes: bool = False) -> Figure:
         raise InputError("receptance", "no moments" if slopes else "no forces", "coordinates of that kind")
     receptance = _thinned(receptance)
     deviation, frequency = _deviation(receptance), to_hz(receptance.omega)
-    figure, grid = _grid(2, len(forces), 4.6, (1.6, 1.0))
+    figure, grid = figure_grid(2, len(forces), 4.6, (1.6, 1.0))
     unit, scale = ("rad/(N m)", 1.0) if slopes else ("µm/N", 1e6)
     sizes: list[FloatArray] = []
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         for column, force in enumerate(forces):
             top, bottom = grid[:, column]
             moved = [c for c in receptance.rows if c.dof.is_slope is slopes and np.any(receptance.between(str(c), str(force)))]
-            for motion, colour in zip(moved, _CURVES, strict=False):
+            for motion, colour in zip(moved, CURVES, strict=False):
                 value = scale * receptance.between(str(motion), str(force))
                 size = np.abs(value)
                 if (motion, force) in deviation:
@@ -86,7 +86,7 @@ def receptance_figure(receptance: Receptance, slopes: bool = False) -> Figure:
                     top.fill_between(frequency, low, high, color=colour, alpha=0.3, lw=0)
                 top.plot(frequency, size, color=colour, label=str(motion))
                 sizes.append(size)
-                bottom.plot(frequency, _without_jumps(np.degrees(np.angle(value))), color=colour)
+                bottom.plot(frequency, without_jumps(np.degrees(np.angle(value))), color=colour)
             top.set_yscale("log")
             top.set_title(f"{'moment' if slopes else 'force'} at {force}", parse_math=False)
             top.legend(loc="best")
@@ -131,8 +131,8 @@ def recording_figure(recording: Recording, seconds: float = 0.05, start: float |
     start = max(0.5 * (time[-1] - seconds), 0.0) if start is None else start
     shown = (time >= start) & (time <= start + seconds)
     quantities = [quantity for quantity in Quantity if any(sensor.quantity is quantity for sensor in recording.sensors)]
-    figure, grid = _grid(len(quantities), 1, 0.8 + 1.9 * len(quantities), sharey="none")
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(len(quantities), 1, 0.8 + 1.9 * len(quantities), sharey="none")
+    with mpl.rc_context(STYLE):
         for quantity, ax in zip(quantities, grid[:, 0], strict=True):
             name, scale = _UNITS[quantity]
             for i, sensor in enumerate(recording.sensors):

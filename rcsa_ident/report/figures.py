@@ -1,14 +1,8 @@
-"""Figures of an identification, without a window: each function returns a figure, `svg` makes text of it.
-
-One file for all, though a little long: they share one style, one palette and the way from figure to text.
-"""
+"""Figures of an identification, without a window: each function returns a figure, `style.svg` makes text of it."""
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -21,16 +15,10 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, MetTest
+from rcsa_ident.report.style import COLOURS, STYLE, TRUTH, figure_grid, wide, without_jumps
 
-#: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
-COLOURS = {
-    "X": "#0072B2", "Y": "#C8501A", "Z": "#5D4FA2",
-    "XY": "#009E73", "YX": "#AA4499", "XZ": "#B8860B", "ZX": "#7F3C00", "YZ": "#56B4E9", "ZY": "#1F2933",
-}  # fmt: skip
 #: Share of the largest value below which curves across the planes, which pass through zero, are cut off.
 _LEAST_SHOWN = 3e-4
-#: Highest over lowest frequency, above which the scale is logarithmic.
-_WIDE = 200.0
 STAGES = {
     Stage.SEARCH: ("genetic search", "#9aa5b1"),
     Stage.REFINE: ("refined candidates", "#0072B2"),
@@ -41,66 +29,6 @@ STAGES = {
     Stage.GROW: ("one mode more than the evidence supports", "#56B4E9"),
     Stage.GENERATION: ("best of each generation", "#0072B2"),
 }
-_TRUTH = "#1f2933"
-_STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Arial", "Helvetica"],
-    "font.size": 10.0,
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#52606d",
-    "axes.labelcolor": "#1f2933",
-    "grid.color": "#e4e7eb",
-    "xtick.color": "#52606d",
-    "ytick.color": "#52606d",
-    "legend.frameon": False,
-    "legend.fontsize": 9.0,
-    "lines.linewidth": 1.5,
-    "path.simplify_threshold": 0.3,
-}
-
-
-def svg(figure: Figure, name: str) -> str:
-    """Return the figure as an SVG element for a page.
-
-    Parameters
-    ----------
-    name : str
-        Prefix of its ids, which a page with several figures needs to be different; the same figure gives the same text.
-    """
-    text = io.StringIO()
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-    content = text.getvalue()
-    content = content[content.index("<svg") :]
-    content = re.sub(r'\bid="', f'id="{name}-', content)
-    content = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", content)
-    # the page sets the width, the view box keeps the shape
-    content = re.sub(r'<svg ([^>]*?)width="[^"]*"', r"<svg \1", content, count=1)
-    content = re.sub(r'<svg ([^>]*?)height="[^"]*"', r"<svg \1", content, count=1)
-    # a hundredth of a point is below what an eye resolves
-    content = re.sub(r"(\d\.\d\d)\d+", r"\1", content)
-    return re.sub(r"<metadata>.*?</metadata>\s*", "", content, flags=re.DOTALL)
-
-
-def letters(name: str) -> str:
-    """Return a label that shows a name letter by letter: matplotlib takes what stands between two dollar signs for a formula."""
-    return name.replace("$", r"\$")
-
-
-def _grid(
-    rows: int, cols: int, height: float, ratios: Sequence[float] | None = None, sharey: Literal["row", "none"] = "row"
-) -> tuple[Figure, np.ndarray]:
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(9.6, height), layout="constrained")
-        axes = figure.subplots(rows, cols, sharex=True, sharey=sharey, squeeze=False, height_ratios=ratios)
-    return figure, axes
 
 
 def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
@@ -118,8 +46,8 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
     value, model = (np.asarray(axis.measured[key], dtype=complex) for key in ("value", "model"))
     of = np.array(tooling)[cut]
     names = list(dict.fromkeys(of.tolist()))
-    figure, grid = _grid(2, len(names), 4.6, (1.6, 1.0))
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(2, len(names), 4.6, (1.6, 1.0))
+    with mpl.rc_context(STYLE):
         for column, each in enumerate(names):
             order = np.flatnonzero(of == each)
             order = order[np.argsort(omega[order])]
@@ -128,11 +56,11 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
             points, line = value[order], model[order]
             pairs = (
                 (top, 1e6 * np.abs(points), 1e6 * np.abs(line)),
-                (bottom, np.degrees(np.angle(points)), _without_jumps(np.degrees(np.angle(line)))),
+                (bottom, np.degrees(np.angle(points)), without_jumps(np.degrees(np.angle(line)))),
             )
             for ax, measured, fitted in pairs:
                 ax.plot(frequency, measured, "o", ms=3.4, mfc="none", mec=COLOURS[name], mew=1.0, zorder=3, label="measured")
-                ax.plot(frequency, fitted, color=_TRUTH, lw=1.0, zorder=2, label="fitted")
+                ax.plot(frequency, fitted, color=TRUTH, lw=1.0, zorder=2, label="fitted")
         _size_over_phase(grid, "|C31|  [µm/N]", [f"{name}: {each}" for each in names])
     return figure
 
@@ -147,18 +75,18 @@ def hammer_tests(tests: Sequence[MetTest], name: str) -> Figure:
     name : str
         X or Y.
     """
-    figure, grid = _grid(2, len(tests), 4.6, (1.6, 1.0))
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(2, len(tests), 4.6, (1.6, 1.0))
+    with mpl.rc_context(STYLE):
         for column, test in enumerate(tests):
             frequency = to_hz(test.lines.omega)
             top, bottom = grid[:, column]
             top.plot(frequency, 1e6 * np.abs(test.lines.value), "o", ms=2.6, mfc="none", mec=COLOURS[name], mew=0.8, label="hammer")
-            top.plot(frequency, 1e6 * np.abs(test.model), color=_TRUTH, lw=1.0, label="fitted")
+            top.plot(frequency, 1e6 * np.abs(test.model), color=TRUTH, lw=1.0, label="fitted")
             for value, style in (
                 (test.lines.value, {"color": COLOURS[name], "lw": 2.4, "alpha": 0.5}),
-                (test.model, {"color": _TRUTH, "lw": 1.0}),
+                (test.model, {"color": TRUTH, "lw": 1.0}),
             ):
-                bottom.plot(frequency, _without_jumps(np.degrees(np.angle(value))), **style)
+                bottom.plot(frequency, without_jumps(np.degrees(np.angle(value))), **style)
         _size_over_phase(grid, "receptance  [µm/N]", [f"{name}: {test.lines.id}" for test in tests])
     return figure
 
@@ -176,18 +104,11 @@ def _size_over_phase(grid: np.ndarray, size: str, titles: Sequence[str]) -> None
     grid[0, -1].legend(loc="upper right")
 
 
-def _without_jumps(degrees: FloatArray) -> FloatArray:
-    """Break the line where the phase wraps."""
-    broken = degrees.copy()
-    broken[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
-    return broken
-
-
 def convergence(found: Identification) -> Figure:
     """Cost over the search's evaluations, and what the data pay for another mode, a row for each axis."""
     names = [str(axis) for axis in found.axes]
     counted = any(step.stage is Stage.MODES for step in found.trace)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 2.5 * len(names) + 0.4), layout="constrained")
         grid = figure.subplots(len(names), 2 if counted else 1, squeeze=False, width_ratios=(1.9, 1.0) if counted else (1.0,))
         for row, name in zip(grid, names, strict=True):
@@ -227,7 +148,7 @@ def _evidence(ax: Axes, trace: Sequence[Step], name: str) -> None:
         best[step.modes] = min(step.cost, best.get(step.modes, np.inf))
     counts = sorted(best)
     lowest = min(best.values(), default=0.0)
-    ax.plot(counts, [best[c] - lowest for c in counts], "o-", color=COLOURS.get(name, _TRUTH), ms=4.0)
+    ax.plot(counts, [best[c] - lowest for c in counts], "o-", color=COLOURS.get(name, TRUTH), ms=4.0)
     ax.set_yscale("symlog", linthresh=10.0)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_title(f"{name}: number of modes")
@@ -257,8 +178,8 @@ def tooltip_frf(
     columns = list(dict.fromkeys("across" if len(name) > 1 else name for name in tip))
     reversed_ = {name: name[::-1] for name in tip if name < name[::-1] in tip}
     alike = {a: b for a, b in reversed_.items() if np.allclose(tip[a], tip[b], rtol=0.0, atol=1e-6 * float(np.max(np.abs(tip[a]))))}
-    figure, grid = _grid(2, len(columns), 4.8, (1.3, 1.0))
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(2, len(columns), 4.8, (1.3, 1.0))
+    with mpl.rc_context(STYLE):
         for axis, value in tip.items():
             if axis in alike.values():
                 continue
@@ -277,8 +198,8 @@ def tooltip_frf(
             top.plot(frequency, size, color=COLOURS[axis], label=name if len(axis) > 1 else "predicted")
             bottom.plot(frequency, real, color=COLOURS[axis])
             if truth is not None and axis in truth:
-                top.plot(frequency, 1e6 * np.abs(truth[axis]), "--", color=_TRUTH, lw=1.1, label="true" if len(axis) == 1 else None)
-                bottom.plot(frequency, 1e6 * truth[axis].real, "--", color=_TRUTH, lw=1.1)
+                top.plot(frequency, 1e6 * np.abs(truth[axis]), "--", color=TRUTH, lw=1.1, label="true" if len(axis) == 1 else None)
+                bottom.plot(frequency, 1e6 * truth[axis].real, "--", color=TRUTH, lw=1.1)
             top.set_yscale("log")
         for (top, bottom), name in zip(grid.T, columns, strict=True):
             for ax in (top, bottom):
@@ -299,11 +220,6 @@ def tooltip_frf(
         grid[0, 0].set_ylabel("|C11|  [µm/N]")
         grid[1, 0].set_ylabel("real part [µm/N]")
     return figure
-
-
-def wide(frequency: FloatArray) -> bool:
-    """Say whether a scale in proportion would leave no room for the lowest modes: an arm's stand two decades below the tool's."""
-    return bool(frequency[-1] > _WIDE * frequency[0])
 
 
 def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float] | None, named: bool = True) -> None:

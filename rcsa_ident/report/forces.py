@@ -13,7 +13,7 @@ from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.observer.force import ForceEstimate
 from rcsa_ident.observer.response import FLAT, ObserverFRF, decibel
-from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
+from rcsa_ident.report.style import COLOURS, STYLE, TRUTH, figure_grid
 
 
 def force_history(
@@ -35,15 +35,15 @@ def force_history(
     length = revolutions * 2.0 * np.pi / spindle_speed
     start = max(0.5 * (time[0] + time[-1] - length), time[0]) if start is None else start
     shown = (time >= start) & (time <= start + length)
-    figure, grid = _grid(len(estimate.axes), 1, 1.2 + 2.2 * len(estimate.axes), sharey="none")
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(len(estimate.axes), 1, 1.2 + 2.2 * len(estimate.axes), sharey="none")
+    with mpl.rc_context(STYLE):
         for i, (axis, ax) in enumerate(zip(estimate.axes, grid[:, 0], strict=True)):
             name, milliseconds = axis.upper(), 1e3 * (time[shown] - start)
             force, band = estimate.force[shown, i], 2.0 * estimate.standard_deviation[shown, i]
             colour = COLOURS[name]
             ax.fill_between(milliseconds, force - band, force + band, color=colour, alpha=0.2, lw=0.0, label="± 2 standard deviations")
             if true is not None:
-                ax.plot(milliseconds, true[shown, i], color=_TRUTH, lw=1.0, ls="--", label="true")
+                ax.plot(milliseconds, true[shown, i], color=TRUTH, lw=1.0, ls="--", label="true")
             ax.plot(milliseconds, force, color=colour, label="estimated")
             ax.set_ylabel(f"force {name} [N]")
             ax.set_title(f"{name}: {revolutions:g} revolutions from {start:.3f} s")
@@ -61,8 +61,8 @@ def observer_frf(responses: Mapping[Dof, ObserverFRF], band: tuple[float, float]
     band : two floats [rad/s]
         Frequencies between which forces are estimated; outside is shaded.
     """
-    figure, grid = _grid(2, len(responses), 5.2, (1.0, 1.0))
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(2, len(responses), 5.2, (1.0, 1.0))
+    with mpl.rc_context(STYLE):
         for column, (axis, response) in enumerate(responses.items()):
             name, frequency = axis.upper(), to_hz(response.omega)
             top, bottom = grid[:, column]
@@ -77,7 +77,7 @@ def observer_frf(responses: Mapping[Dof, ObserverFRF], band: tuple[float, float]
                     decibel(response.at_line),
                     "o",
                     ms=4.0,
-                    color=_TRUTH,
+                    color=TRUTH,
                     mfc="none",
                     label="spindle's orders",
                 )

@@ -24,6 +24,7 @@ from rcsa_ident.identification.unknowns import JOINT
 from rcsa_ident.report import figures
 from rcsa_ident.report.drawing import tooling_svg
 from rcsa_ident.report.lobes import stability_figure
+from rcsa_ident.report.style import svg
 from rcsa_ident.report.summaries import (
     advice_summary,
     coefficient_rows,
@@ -140,7 +141,7 @@ def report_html(
         or (found.whole is not None and found.whole.best.layout.softening),
         joint=_joint(next(iter(found.axes.values())), found.whole) if found.axes else [],
         untold=UNTOLD,
-        convergence=figures.svg(figures.convergence(found), "search") if found.axes and found.trace else "",
+        convergence=svg(figures.convergence(found), "search") if found.axes and found.trace else "",
         evaluations=len(found.trace),
         toolings=[_tooling(i, page) for i, page in enumerate(toolings)],
         known=any(page.error for page in toolings),
@@ -268,8 +269,8 @@ def _axis(name: str, part: AxisResult, tooling: Sequence[str], deviation: tuple[
         "residual": part.modes.residual.tolist(),
         "band": (float(to_hz(omega.min())), float(to_hz(omega.max()))) if omega.size else None,
         "points": omega.size,
-        "figure": figures.svg(figures.cross_frf(part, tooling, name), f"cross{name}") if omega.size else "",
-        "hammer": figures.svg(figures.hammer_tests(part.tests, name), f"hammer{name}") if part.tests else "",
+        "figure": svg(figures.cross_frf(part, tooling, name), f"cross{name}") if omega.size else "",
+        "hammer": svg(figures.hammer_tests(part.tests, name), f"hammer{name}") if part.tests else "",
     }
 
 
@@ -308,10 +309,10 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
     return {
         "page": page,
         "peaks": {axis: peak_row(page.frequency, value) for axis, value in page.tip.items()},
-        "tip": figures.svg(figures.tooltip_frf(page.frequency, page.tip, page.deviation, page.truth, page.band_hz), f"tip{number}"),
+        "tip": svg(figures.tooltip_frf(page.frequency, page.tip, page.deviation, page.truth, page.band_hz), f"tip{number}"),
         "lobes": ""
         if page.advice is None
-        else figures.svg(
+        else svg(
             stability_figure(
                 page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable, around=page.advice.drawn_around
             ),

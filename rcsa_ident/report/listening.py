@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import to_hz, to_rpm
-from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS
+from rcsa_ident.report.style import COLOURS, STYLE, TRUTH
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.spectra import envelope, mean_spectrum, spectrogram
@@ -37,7 +37,7 @@ def listening_figure(answer: Listening) -> Figure:
     if answer.record is None:
         raise InputError("record", "none", "what a recording says together with its samples")
     signal, rate, quantity, name = answer.record.loudest, answer.record.rate, answer.record.quantity, answer.record.name
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.4, 8.6), layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, height_ratios=(1.0, 1.4, 1.4))
         figure.suptitle(f"{name}\n{_headline(answer)}" if name else _headline(answer), fontsize=11, fontweight="bold")
@@ -93,7 +93,7 @@ def _orders(ax: Axes, signal: FloatArray, rate: float, answer: Listening, unit: 
     spindle = None if answer.spindle_speed is None else to_hz(answer.spindle_speed)
     high = answer.band if spindle is None else min(answer.band, _ORDERS * spindle)
     shown = (frequency > 0.2 * (spindle or 0.0)) & (frequency <= high)
-    ax.semilogy(frequency[shown] / (spindle or 1.0), amplitude[shown], color=_TRUTH, lw=0.7)
+    ax.semilogy(frequency[shown] / (spindle or 1.0), amplitude[shown], color=TRUTH, lw=0.7)
     if spindle is not None:
         teeth = answer.teeth
         for order in range(1, int(high / spindle) + 1):

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import to_hz, to_rpm
-from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
+from rcsa_ident.report.style import COLOURS, CURVES, GREEN, GREY, RED, STYLE, TRUTH, figure_grid
 from rcsa_ident.stability.advice import UsableDepths
 from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict
 from rcsa_ident.stability.operating_point import OperatingPoint
@@ -21,11 +21,8 @@ from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
 
-_GREY, _GREEN, _RED = "#52606d", "#00704f", "#a33f12"
 #: Marker, colour and filling of a tested cut.
-_VERDICTS = {Verdict.STABLE: ("o", _GREEN, "none"), Verdict.CHATTER: ("X", _RED, _RED), Verdict.MARGINAL: ("D", "#b8860b", "none")}
-#: Lines of curves that are compared.
-_CURVES = ("#0072B2", "#C8501A", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#1f2933")
+_VERDICTS = {Verdict.STABLE: ("o", GREEN, "none"), Verdict.CHATTER: ("X", RED, RED), Verdict.MARGINAL: ("D", "#b8860b", "none")}
 
 
 class Judged(NamedTuple):
@@ -84,9 +81,9 @@ def stability_figure(
         Limits around the recommended cuts, with bands of their own; the lobes are then drawn as the preview that they are.
     """
     rows = (2.2, 1.0) if surface is None else (2.2, 1.0, 1.0)
-    figure, grid = _grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")
+    figure, grid = figure_grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")
     top, bottom = grid[0, 0], grid[-1, 0]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         max_depth, ceiling = lobes.max_depth, _ceiling(lobes, tested)
         if chart is not None:
             ceiling = 1e3 * float(chart.depth[-1])
@@ -95,25 +92,25 @@ def stability_figure(
             _draw_exact(top, each, named=k == 0)
         if true_limit is not None:
             top.plot(
-                to_rpm(lobes.spindle_speed), 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF"
+                to_rpm(lobes.spindle_speed), 1e3 * np.minimum(true_limit, max_depth), "--", color=TRUTH, lw=1.1, label="from the true FRF"
             )
         if lobes.absolute_limit is not None and lobes.absolute_limit < max_depth:
             label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
-            top.axhline(1e3 * lobes.absolute_limit, color=_GREY, ls=":", lw=1.2, label=label)
+            top.axhline(1e3 * lobes.absolute_limit, color=GREY, ls=":", lw=1.2, label=label)
         if recommended and around is None:
             speed, depth = lobes.ordered().spindle_speed, lobes.ordered().recommended_depth()
             if usable is not None:
                 speed, depth = usable.spindle_speed, usable.stable
-            top.plot(to_rpm(speed), 1e3 * depth, color=_GREEN, lw=1.1, label="recommended depth")
+            top.plot(to_rpm(speed), 1e3 * depth, color=GREEN, lw=1.1, label="recommended depth")
         for point in recommended:
             x, y = to_rpm(point.spindle_speed), 1e3 * point.depth
             if point.depth < np.inf:
-                top.plot(x, y, "v", color=_GREEN, ms=8.0)
+                top.plot(x, y, "v", color=GREEN, ms=8.0)
             # above the limit, where no line crosses it
             above = (x, min(1e3 * point.limit, 0.86 * ceiling))
             none = "no depth recommended" if point.why else f"no limit up to {1e3 * point.limit:g} mm"
             text = f"{x:.0f} rev/min\n" + (f"{y:.2f} mm" if point.depth < np.inf else none)
-            top.annotate(text, above, xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
+            top.annotate(text, above, xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8.5, color=GREEN)
         if tested is not None:
             _draw_tested(top, tested)
         top.set_ylim(0.0, ceiling)
@@ -167,8 +164,8 @@ def _draw_limit(
 
 
 def _name_sides(ax: Axes) -> None:
-    ax.text(0.008, 0.97, "chatter", transform=ax.transAxes, va="top", color=_RED, fontsize=9.5, style="italic")
-    ax.text(0.008, 0.03, "stable", transform=ax.transAxes, va="bottom", color=_GREEN, fontsize=9.5, style="italic")
+    ax.text(0.008, 0.97, "chatter", transform=ax.transAxes, va="top", color=RED, fontsize=9.5, style="italic")
+    ax.text(0.008, 0.03, "stable", transform=ax.transAxes, va="bottom", color=GREEN, fontsize=9.5, style="italic")
 
 
 def _draw_map(ax: Axes, chart: StabilityMap) -> None:
@@ -176,13 +173,13 @@ def _draw_map(ax: Axes, chart: StabilityMap) -> None:
     depth = 1e3 * np.concatenate([[0.0], chart.depth])
     growth = np.concatenate([np.minimum(chart.growth[:, :1], -0.1), chart.growth], axis=1).T
     ax.contourf(to_rpm(chart.spindle_speed), depth, growth, [-np.inf, 0.0, np.inf], colors=["#009E73", "#C8501A"], alpha=0.13)
-    ax.contour(to_rpm(chart.spindle_speed), depth, growth, [0.0], colors=[_GREY], linewidths=0.9)
+    ax.contour(to_rpm(chart.spindle_speed), depth, growth, [0.0], colors=[GREY], linewidths=0.9)
 
 
 def map_figure(chart: StabilityMap) -> Figure:
     """Stable and unstable cuts over spindle speed and depth."""
-    figure, grid = _grid(1, 1, 3.6)
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(1, 1, 3.6)
+    with mpl.rc_context(STYLE):
         _draw_map(grid[0, 0], chart)
         _name_sides(grid[0, 0])
         grid[0, 0].set_ylabel("axial depth [mm]")
@@ -193,8 +190,8 @@ def map_figure(chart: StabilityMap) -> Figure:
 
 def surface_figure(surface: SurfaceError) -> Figure:
     """Surface location error over spindle speed."""
-    figure, grid = _grid(1, 1, 3.0)
-    with mpl.rc_context(_STYLE):
+    figure, grid = figure_grid(1, 1, 3.0)
+    with mpl.rc_context(STYLE):
         _draw_surface(grid[0, 0], surface)
         grid[0, 0].set_xlabel("spindle speed [rev/min]")
         grid[0, 0].legend(loc="upper right")
@@ -228,7 +225,7 @@ def _draw_chatter(ax: Axes, lobes: StabilityLobes) -> None:
     # another lobe or another mode: no line between them
     jumps = np.abs(np.diff(chatter, prepend=chatter[0])) > 0.03 * chatter
     chatter[jumps] = np.nan
-    ax.plot(speed, chatter, color=_GREY)
+    ax.plot(speed, chatter, color=GREY)
     ax.set_ylabel("chatter [Hz]")
 
 
@@ -236,7 +233,7 @@ def _draw_surface(ax: Axes, surface: SurfaceError) -> None:
     speed, error = to_rpm(surface.spindle_speed), 1e6 * surface.error
     ax.fill_between(speed, error.min(axis=1), error.max(axis=1), color="#CC79A7", alpha=0.35, lw=0, label="over the depth")
     ax.plot(speed, error.mean(axis=1), color="#CC79A7", label="mean")
-    ax.axhline(0.0, color=_GREY, lw=0.8)
+    ax.axhline(0.0, color=GREY, lw=0.8)
     ax.set_ylabel("wall [µm]\n+ left, – gone")
     ax.set_title(f"surface location error at {1e3 * float(surface.height[-1]):g} mm depth, where teeth {_LEAVE[str(surface.wall)]}")
 
@@ -248,7 +245,7 @@ def cases_figure(panels: Sequence[Panel]) -> Figure:
     """Lobes of several cases with the cuts that were tested in each, two in a row."""
     rows = (len(panels) + 1) // 2
     cols = min(2, len(panels))
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 0.5 + 2.9 * rows), layout="constrained")
         grid = figure.subplots(rows, cols, squeeze=False)
         labels: dict[str, Artist] = {}
@@ -256,7 +253,7 @@ def cases_figure(panels: Sequence[Panel]) -> Figure:
             ceiling = _ceiling(panel.lobes, panel.tested)
             _draw_limit(ax, panel.lobes, ceiling, bands=False)
             speed = to_rpm(panel.lobes.spindle_speed)
-            for (name, limit), colour in zip(panel.others.items(), (_TRUTH, *_CURVES[2:]), strict=False):
+            for (name, limit), colour in zip(panel.others.items(), (TRUTH, *CURVES[2:]), strict=False):
                 ax.plot(speed, 1e3 * np.minimum(limit, panel.lobes.max_depth), "--", color=colour, lw=1.1, label=name)
             title = panel.title
             if panel.tested is not None:
@@ -278,6 +275,6 @@ def cases_figure(panels: Sequence[Panel]) -> Figure:
 
 def save_figure(figure: Figure, path: str) -> None:
     """Write a figure as PNG or SVG, as the name ends; the same figure gives the same file."""
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": "figure"}):
+    with mpl.rc_context({**STYLE, "svg.hashsalt": "figure"}):
         metadata = {"Date": None} if path.lower().endswith(".svg") else {"Software": None}
         figure.savefig(path, dpi=150, metadata=metadata)

@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.report.figures import _STYLE
+from rcsa_ident.report.style import STYLE
 from rcsa_ident.toolpath.dexel import DexelField
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.toolpath.removal import surface_made_by
@@ -34,7 +34,7 @@ def part_figure(field: DexelField, path: ToolPath | None = None) -> Figure:
     path : ToolPath or None
         Drawn from above.
     """
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 4.8), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
         _shaded(left, field)
@@ -44,7 +44,7 @@ def part_figure(field: DexelField, path: ToolPath | None = None) -> Figure:
 
 def save_part(path: str | Path, field: DexelField, tool_path: ToolPath | None = None) -> None:
     """Write the picture as the file's suffix says."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         part_figure(field, tool_path).savefig(path, dpi=150)
 
 
@@ -69,7 +69,7 @@ def coloured_part_figure(
     known = values[np.isfinite(values)]
     low, high = limits if limits is not None else (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     colours = mpl.cm.ScalarMappable(mpl.colors.Normalize(low, high if high > low else low + 1.0), "RdYlGn" if limits else "coolwarm")
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 4.8), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
         points, faces, made = surface_made_by(field, path, np.flatnonzero(np.isfinite(values)), reach, _TRIANGLES)
@@ -104,7 +104,7 @@ def save_coloured_part(
     file: str | Path, field: DexelField, path: ToolPath, values: FloatArray, label: str, limits: tuple[float, float] | None, reach: float
 ) -> None:
     """Write `coloured_part_figure` as the file's suffix says."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         coloured_part_figure(field, path, values, label, limits, reach).savefig(file, dpi=150)
 
 

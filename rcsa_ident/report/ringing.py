@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.identification.ring.ringing import UNKNOWNS, RungTooling
-from rcsa_ident.report.figures import _STYLE, COLOURS
+from rcsa_ident.report.style import COLOURS, STYLE
 from rcsa_ident.tool_holder.free_modes import Motion
 
 _PRIOR, _AFTER = "#9aa5b1", "#009E73"
@@ -22,7 +22,7 @@ def ring_figure(found: RungTooling) -> Figure:
     found : RungTooling
     """
     known = [line for line in found.lines if line.mode is not None and line.mode.motion is Motion.BENDING and line.after is not None]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.4, 3.2 + 0.3 * len(UNKNOWNS)), layout="constrained")
         top, bottom = figure.subplots(2, 1, height_ratios=(1.0, 2.0))
         figure.suptitle(f"{found.after.name}: what its ring tells", fontsize=11, fontweight="bold")

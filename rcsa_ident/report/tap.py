@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rcsa_ident.base.units import to_hz
-from rcsa_ident.report.figures import _STYLE, COLOURS
+from rcsa_ident.report.style import COLOURS, STYLE
 from rcsa_ident.signals.tap import TapFrf
 
 
@@ -21,7 +21,7 @@ def tap_figure(found: TapFrf) -> Figure:
     axis, rows = found.axis, 2 if found.coherence is None else 3
     frequency, size = to_hz(found.omega), np.abs(found.receptance)
     band = 2.0 * np.sqrt(found.variance)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 2.2 + 1.7 * rows), layout="constrained")
         top, *others = figure.subplots(rows, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0)[:rows])
         top.fill_between(frequency, 1e6 * np.maximum(size - band, 1e-3 * size), 1e6 * (size + band), color=COLOURS[axis], alpha=0.2, lw=0.0)

@@ -71,7 +71,7 @@ class LineSpectrum:
         return replace(self, amplitude=self.amplitude[:kept], variance=self.variance[:kept], scatter=self.scatter[:kept])
 
 
-class _Comb(NamedTuple):
+class Comb(NamedTuple):
     """The orders' phase over the samples: step from one to the next, and what it deviates from that, shape (n,), None where it does not."""
 
     step: float
@@ -104,9 +104,9 @@ class _Comb(NamedTuple):
             return order_signal(amplitude, self.step, n)
         return angle_signal(amplitude[None], turned(self.angle(n)), n)
 
-    def part(self, start: int, length: int) -> _Comb:
+    def part(self, start: int, length: int) -> Comb:
         """Of samples in a row."""
-        return _Comb(self.step, None if self.deviation is None else self.deviation[start : start + length])
+        return Comb(self.step, None if self.deviation is None else self.deviation[start : start + length])
 
 
 def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int = 16, search: float = SPEED_SEARCH) -> float:
@@ -167,7 +167,7 @@ def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16
     step = near / rate
     highest = int(min(orders, 0.9 * np.pi / step))
     for _ in range(4):
-        middles, lines = _block_lines(samples, _Comb(step, deviation), highest, *_blocks(samples.shape[0], 2.0 * np.pi / step))
+        middles, lines = _block_lines(samples, Comb(step, deviation), highest, *_blocks(samples.shape[0], 2.0 * np.pi / step))
         change = _common_rotation(lines, middles)
         step += change
         if abs(change) * samples.shape[0] * highest < 1e-2:
@@ -189,7 +189,7 @@ def _blocks(n: int, period: float) -> tuple[np.ndarray, int]:
     return np.minimum(starts, n - length) + max(n - length - starts[-1], 0) // 2, length
 
 
-def _block_lines(samples: FloatArray, comb: _Comb, highest: int, starts: np.ndarray, length: int) -> tuple[FloatArray, ComplexArray]:
+def _block_lines(samples: FloatArray, comb: Comb, highest: int, starts: np.ndarray, length: int) -> tuple[FloatArray, ComplexArray]:
     """Blocks' middles from the record's, and their amplitudes with phases from there, shapes (blocks,) and (blocks, m + 1, c)."""
     n, channels = samples.shape
     basis = _drift_basis(length, 2)
@@ -238,7 +238,7 @@ def line_spectrum(
         Of the spindle's angle from that at this speed, where it does not turn evenly.
     """
     n = samples.shape[0]
-    comb = _Comb(spindle_speed / rate, deviation)
+    comb = Comb(spindle_speed / rate, deviation)
     highest = int(min(max_frequency, 0.45 * rate) * 2.0 * np.pi / spindle_speed)
     basis = _drift_basis(n, DRIFT_DEGREE)
 
@@ -377,7 +377,7 @@ def segment_lines(
     return np.array(parts)
 
 
-def _fit(samples: FloatArray, comb: _Comb, highest: int, basis: FloatArray) -> tuple[ComplexArray, FloatArray]:
+def _fit(samples: FloatArray, comb: Comb, highest: int, basis: FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Least-squares amplitudes (phases from the middle), and the coefficients of other columns, shape (n, k), that are fitted, too."""
     n, channels = samples.shape
     offset = samples.mean(axis=0)

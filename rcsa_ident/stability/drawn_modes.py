@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import connected_components
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.rational import common_poles, shared_residues
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.first_instability import first_loss
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import ROUGH, Growth, islands_from, longest_step
 from rcsa_ident.stability.tip_modes import DAMPED_OUTSIDE, FIT_TOLERANCE, TipModes, slope_length

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -20,13 +21,23 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.stability.axial_doubt import axial_doubt
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.drawn_modes import drawn_tips, of_draw
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.methods import StabilityMethod
+from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes, fitted_modes, known_modes, receptance_of
 from rcsa_ident.stability.zero_order import ZeroOrder
 
+#: All methods by their names.
+METHODS: Mapping[str, type[StabilityMethod]] = {
+    ZeroOrder.name: ZeroOrder,
+    MultiFrequency.name: MultiFrequency,
+    SemiDiscretisation.name: SemiDiscretisation,
+    FullDiscretisation.name: FullDiscretisation,
+    TimeDomain.name: TimeDomain,
+}
 _ZERO_ORDER = ZeroOrder()
 #: Machines drawn from what the records leave open, each with cutting coefficients of its own.
 DRAWS = 60
@@ -38,6 +49,26 @@ APART = 0.015
 ROUGH_FIT = 0.05
 #: Longest estimated time that one limit may take [s].
 LONGEST_LIMIT = 3600.0
+
+
+def method_named(name: str, field: str = "method") -> StabilityMethod:
+    """Return a method with its default settings.
+
+    Parameters
+    ----------
+    name : str
+        One of `MethodName`.
+    field : str
+        What the user calls the name, for the error.
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    """
+    if name not in METHODS:
+        raise InputError(field, name, f"one of {', '.join(METHODS)}")
+    return METHODS[name]()
 
 
 def stability_lobes(

@@ -1,13 +1,10 @@
-"""The stability methods by name: a further one is a file beside this one and a line in `MethodName`."""
+"""What a stability method is: a further one is a file beside this one, a line in `MethodName` and one in `lobes.METHODS`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from enum import StrEnum
-from importlib import import_module
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, runtime_checkable
-
-from rcsa_ident.base.errors import InputError
 
 if TYPE_CHECKING:
     from rcsa_ident.base.arrays import FloatArray
@@ -23,7 +20,7 @@ LOOKS, FITTED_MODES, ABOVE_TOP = 13.0, 18.0, 1.6
 
 
 class MethodName(StrEnum):
-    """Names of all methods: ``full-discretisation`` is the class `FullDiscretisation` in `full_discretisation`."""
+    """Names of all methods: ``full-discretisation`` is the class `FullDiscretisation`."""
 
     ZERO_ORDER = "zero-order"
     MULTI_FREQUENCY = "multi-frequency"
@@ -76,46 +73,3 @@ def coarse_to_fine(count: int) -> list[int]:
         return list(range(count))
     steps = (1 << k for k in reversed(range((count - 1).bit_length())))
     return list(dict.fromkeys([0, count - 1, *(place for step in steps for place in range(0, count, step))]))
-
-
-class _Methods(Mapping[str, type[StabilityMethod]]):
-    """Imports a method when it is asked for: listing the names imports nothing."""
-
-    def __getitem__(self, name: str) -> type[StabilityMethod]:
-        member = MethodName._value2member_map_.get(name)
-        if member is None:
-            raise KeyError(name)
-        found: type[StabilityMethod] = getattr(
-            import_module(f"rcsa_ident.stability.{member.name.lower()}"), member.name.title().replace("_", "")
-        )
-        return found
-
-    def __iter__(self) -> Iterator[str]:
-        return (name.value for name in MethodName)
-
-    def __len__(self) -> int:
-        return len(MethodName)
-
-
-#: All methods by their names.
-METHODS: Mapping[str, type[StabilityMethod]] = _Methods()
-
-
-def method_named(name: str, field: str = "method") -> StabilityMethod:
-    """Return a method with its default settings.
-
-    Parameters
-    ----------
-    name : str
-        One of `MethodName`.
-    field : str
-        What the user calls the name, for the error.
-
-    Raises
-    ------
-    InputError
-        If there is no such method.
-    """
-    if name not in METHODS:
-        raise InputError(field, name, f"one of {', '.join(METHODS)}")
-    return METHODS[name]()

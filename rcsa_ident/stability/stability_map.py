@@ -17,7 +17,7 @@ from rcsa_ident.base.plausibility import AXIAL_DEPTH
 from rcsa_ident.base.shown import Drawn
 from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import asked_speeds
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import ROUGH, Growth, longest_step

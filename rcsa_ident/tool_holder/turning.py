@@ -20,8 +20,8 @@ import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.poles import pole_sum
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import projection_basis
 from rcsa_ident.tool_holder.geometry import ToolAssembly
@@ -153,7 +153,7 @@ class TurningToolHolder:
         force[m:] = self.ports[:, 1:].T
         pole, right = np.linalg.eig(state)
         outputs, inputs = self.ports[:, 1:] @ right[:m], np.linalg.solve(right, force)
-        values = pole_sum(frozen(omega), frozen(pole, complex), np.ascontiguousarray(outputs[rows].T * inputs[:, columns])).T
+        values = pole_sum(omega, pole, outputs[rows].T * inputs[:, columns]).T
         return values - np.outer(self.ports[rows, 0] * self.ports[columns, 0], 1.0 / omega**2)
 
 

@@ -17,7 +17,7 @@ from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.stability.advice import Advice, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.band_shares import BandShares, band_shares
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import Growth, longest_step

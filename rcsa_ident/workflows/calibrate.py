@@ -18,9 +18,8 @@ from rcsa_ident.cutting.signal_fit import Dynamometer, SignalCalibration, calibr
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.setup.cut import Cut
-from rcsa_ident.signals._kernels import order_sums
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-from rcsa_ident.signals.spectra import line_spectrum, refine_speed
+from rcsa_ident.signals.spectra import Comb, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann, steady_part
 from rcsa_ident.signals.verdict import chatter
 
@@ -212,7 +211,7 @@ def _block_deviations(rest: FloatArray, rate: float, speed: float, orders: int) 
     for b in range(count):
         start = round(b * each * 2.0 * np.pi / step)
         stop = min(round((b + 1) * each * 2.0 * np.pi / step), n)
-        sums = order_sums(np.ascontiguousarray(rest[start:stop]), step, orders - 1) * (2.0 / (stop - start))
+        sums = Comb(step).sums(np.ascontiguousarray(rest[start:stop]), orders - 1) * (2.0 / (stop - start))
         sums[0] *= 0.5
         middle = start + 0.5 * (stop - start - 1)
         blocks.append(sums * np.exp(-1j * order * step * middle)[:, None])

@@ -23,7 +23,7 @@ from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import BareCutter, Tooling
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.lobes import (
@@ -47,7 +47,6 @@ from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.proportions import edge_length
-from rcsa_ident.workflows.outside import outside_band, outside_speeds
 
 #: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.
 BEYOND = 1.5
@@ -116,7 +115,7 @@ def tooltip(
     if isinstance(tip, TipModes):
         lines = tip.receptance().omega if omega is None else omega
         tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
-    remarks = [*tooling.remarks, *machine.remarks, *([] if speed is None else outside_speeds(machine, np.array([speed])))]
+    remarks = [*tooling.remarks, *machine.remarks, *([] if speed is None else _outside_speeds(machine, np.array([speed])))]
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
         top = to_hz(machine.band[1])
         remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
@@ -264,14 +263,14 @@ class ToolChange:
     def remarks(self, lobes: StabilityLobes) -> tuple[str, ...]:
         """Return what speaks against limits."""
         band = self.machine.band
-        outside = None if band is None else outside_band(lobes, band)
+        outside = None if band is None else _outside_band(lobes, band)
         said = [
             *self.tooling.remarks,
             *self.machine.remarks,
             *lobes.warnings,
             *self._beyond(lobes),
             *([outside] if outside else []),
-            *outside_speeds(self.machine, self.speeds),
+            *_outside_speeds(self.machine, self.speeds),
             *unusual_speeds(self.process, self.speeds),
         ]
         return tuple(dict.fromkeys(said))
@@ -395,3 +394,29 @@ def _lowest_real_part(tip: Receptance) -> tuple[float, float]:
     least = np.einsum("nii->ni", tip.values).real.min(axis=1)
     worst = int(np.argmin(least))
     return float(tip.omega[worst]), float(least[worst])
+
+
+def _outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:
+    """Return a sentence where the limiting vibration lies outside the band in which the machine is known, else None."""
+    low, high = (to_hz(w) for w in band)
+    frequency = to_hz(lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)])
+    outside = (frequency < low) | (frequency > high)
+    if not outside.any():
+        return None
+    worst = float(frequency[outside][np.argmax(np.abs(frequency[outside] - 0.5 * (low + high)))])
+    return (
+        f"at {int(outside.sum())} of {lobes.spindle_speed.size} speeds chatter is expected outside the identified band "
+        f"{low:.0f}-{high:.0f} Hz (as far as {worst:.0f} Hz): the machine is extrapolated there"
+    )
+
+
+def _outside_speeds(machine: TipSource, speeds: FloatArray) -> list[str]:
+    """Return a sentence where a machine that changes with speed is asked for speeds that it was not cut at."""
+    known = machine.speed_range
+    # the last digit of a speed that was written in rev/min is nobody's wish
+    if known is None or (speeds.min() >= known[0] * (1.0 - 1e-9) and speeds.max() <= known[1] * (1.0 + 1e-9)):
+        return []
+    low, high = (to_rpm(speed) for speed in known)
+    return [
+        f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside this range its dynamics at the nearest speed are used"
+    ]

@@ -17,10 +17,9 @@ from api.metrics import Metrics
 from api.streams import engine
 from api.streams.counts import Counts
 from api.streams.engine import Message
-from api.streams.envelope import Envelope
 from api.streams.frames import MOST_INDEX, MOST_SAMPLES, TooLarge, packed, samples_of, samples_of_text, unpacked
 from api.streams.hub import MOST_FLYING, PAUSED, Hub, StreamLimits
-from api.streams.listener import WAITING_BYTES, WAITING_TEXTS, Listener
+from api.streams.listener import WAITING_BYTES, WAITING_TEXTS, Envelope, Listener
 from api.streams.session import BLOCK, FLYING, About, End, Session, Stage
 from rcsa_ident.base.errors import InputError
 

@@ -19,7 +19,7 @@ from tests.fixtures.reach import reached
         # through others, and by names in strings
         ("rcsa_ident/dynamics/_kernels.py", "tests/stability/test_zero_order.py", True),
         ("rcsa_ident/io/recordings/parquet.py", "tests/cli/test_forces.py", True),
-        ("rcsa_ident/stability/semi_discretisation.py", "tests/api/test_tool_change.py", True),
+        ("rcsa_ident/stability/discretisation.py", "tests/api/test_tool_change.py", True),
         # a process imports what it likes
         ("rcsa_ident/version.py", "tests/front/test_names.py", True),
         ("api/tls.py", "tests/api/test_serve.py", True),

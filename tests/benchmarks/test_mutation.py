@@ -52,7 +52,7 @@ def test_a_mutant_is_a_whole_module():
 
 
 def test_tests_of_a_module():
-    assert mutation.own_tests("rcsa_ident/coupling/_kernels.py") == "tests/coupling/test_kernels.py"
+    assert mutation.own_tests("rcsa_ident/machine/_kernels.py") == "tests/machine/test_kernels.py"
     assert mutation.own_tests("api/security.py") == "tests/api/test_security.py"
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from benchmarks import validation
 from benchmarks.page import DOCS, read_rows
-from benchmarks.validation import Case, Measure, cases, distance, holds, main, measured, there
+from benchmarks.validation import cases, distance, holds, main, measured, there
+from benchmarks.validation_case import Case, Measure
 from benchmarks.validation_page import page
 from tests.fixtures.paths import ROOT
 

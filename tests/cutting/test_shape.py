@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.shape import CutterCode, CutterShape
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.stability.mills import COEFFICIENTS, RPM, SKEWED, SLOT, MillingProcess, tip

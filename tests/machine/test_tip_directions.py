@@ -17,7 +17,7 @@ from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, fitted_modes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.stability.mills import COEFFICIENTS, ONE, RPM, SKEWED, Table, mill, tip

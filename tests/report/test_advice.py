@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.report.advice import Mark, advice_figure, comparison_figure, usable_figure
-from rcsa_ident.report.figures import svg
+from rcsa_ident.report.style import svg
 from rcsa_ident.stability.advice import Advice, UsableDepths
 from rcsa_ident.stability.operating_point import Bound, OperatingPoint
 from rcsa_ident.stability.result import StabilityLobes

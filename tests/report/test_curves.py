@@ -6,7 +6,7 @@ import numpy as np
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.report.curves import recording_figure
-from rcsa_ident.report.figures import svg
+from rcsa_ident.report.style import svg
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
 

@@ -16,8 +16,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.io.settings.cutters import CUTTER_KEYS, cutter_of
 from rcsa_ident.io.settings.setups import read_tooling
 from rcsa_ident.io.validated_table import Table
-from rcsa_ident.report.drawing import tooling_svg
-from rcsa_ident.report.edge_detail import edge_detail
+from rcsa_ident.report.drawing import edge_detail, tooling_svg
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly, clamped
 from tests.fixtures.cutters import SHAPES, keys_of

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.report.figures import svg
 from rcsa_ident.report.lobes import Judged, Panel, cases_figure, save_figure, stability_figure
+from rcsa_ident.report.style import svg
 from rcsa_ident.stability.advice import UsableDepths
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict, tally
 from rcsa_ident.stability.operating_point import Bound, OperatingPoint

@@ -23,8 +23,9 @@ from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.unknowns import ModalBlock, parameter_names
-from rcsa_ident.report.figures import svg, tooltip_frf
+from rcsa_ident.report.figures import tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
+from rcsa_ident.report.style import svg
 from rcsa_ident.report.summaries import coefficient_rows, lobes_curves, lobes_summary, mode_rows, recording_rows, two_digits
 from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.setup.cut import Cut, Workpiece

@@ -12,10 +12,9 @@ from rcsa_ident.cutting.deflection import ToolDeflection, deflected_process
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.surface_error import surface_location_error
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TipModes

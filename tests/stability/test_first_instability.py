@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.first_instability import first_loss
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.monodromy import stable_depth_bound
 from rcsa_ident.stability.multiplier_limits import ROUGH, Growth, longest_step

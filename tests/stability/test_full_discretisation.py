@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from tests.oracles.literature import FOUR_MODES, LIMIT_RPM, SLOT_LIMIT_MM

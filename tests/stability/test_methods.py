@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.methods import METHODS, MethodName, Watched, coarse_to_fine, method_named
+from rcsa_ident.stability.lobes import METHODS, method_named, stability_lobes
+from rcsa_ident.stability.methods import MethodName, Watched, coarse_to_fine
 from rcsa_ident.stability.time_domain import TimeDomain
 from tests.stability.mills import ONE, RPM, mill, tip
 

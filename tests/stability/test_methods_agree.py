@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TipModes
 from tests.stability.mills import FOUR, FOUR_COEFFICIENTS, ONE, RPM, SKEWED, TWO, mill, tip

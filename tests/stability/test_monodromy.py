@@ -13,7 +13,7 @@ from rcsa_ident.cutting.conditions import Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.stability._kernels import cut as kernels
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.monodromy import MonodromyOperator, common_period, lobatto
 from rcsa_ident.stability.tip_modes import TipModes

@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.stability import multiplier_limits
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.monodromy import stable_depth_bound
 from rcsa_ident.stability.multiplier_limits import GROWS, PASSES, Growth, longest_step
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from tests.stability.mills import ONE, PASSING, RPM, SKEWED, SLOW, TWO, mill, slow_slot, tip
 
 SPEEDS = np.array([5000.0, 8200.0, 11700.0, 18000.0, 26000.0]) * RPM

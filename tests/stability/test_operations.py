@@ -10,7 +10,8 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.stability import hill
 from rcsa_ident.stability._kernels import monodromy as _monodromy_kernels
 from rcsa_ident.stability._kernels import time as _time_kernels
-from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES, METHODS
+from rcsa_ident.stability.lobes import METHODS
+from rcsa_ident.stability.methods import ABOVE_TOP, FITTED_MODES
 from tests.stability.mills import RPM, mill, tip
 
 HIGHEST = 6000.0

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from tests.oracles.literature import FOUR_MODES, LIMIT_RPM, SLOT_LIMIT_MM
 from tests.stability.mills import FOUR, FOUR_COEFFICIENTS, ONE, RPM, TWO, mill, tip
 

@@ -12,12 +12,11 @@ from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.cutting.serration import Serration
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.multiplier_limits import longest_step
 from rcsa_ident.stability.regeneration import regeneration
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.stability import shaped_mills as mills

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.cutting.process import ProcessDamping
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multiplier_limits import Growth, longest_step
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.stability_map import stability_map
 from tests.stability.mills import ONE, RPM, SKEWED, TWO, mill, tip
 

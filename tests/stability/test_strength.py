@@ -10,11 +10,10 @@ import pytest
 from rcsa_ident.cutting.conditions import EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.multi_frequency import MultiFrequency
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.strength import Search, strength
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder

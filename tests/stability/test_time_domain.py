@@ -13,8 +13,8 @@ from rcsa_ident.cutting.force import force_history, force_lines, runout_force_li
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.stability import time_domain
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.first_instability import first_loss
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multiplier_limits import Growth, longest_step
 from rcsa_ident.stability.time_domain import TimeDomain, _Cut, milling_history

@@ -12,7 +12,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.io.curves.lobes import read_lobes, write_lobes
 from rcsa_ident.report.summaries import lobes_summary
 from rcsa_ident.stability.advice import Advice, highest_removal, speed_windows, usable_depths
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.operating_point import Bound
 from rcsa_ident.stability.result import StabilityLobes

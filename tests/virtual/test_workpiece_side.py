@@ -16,7 +16,7 @@ from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.io.settings.machines import read_machine
 from rcsa_ident.io.settings.setups import read_campaign
 from rcsa_ident.signals.recording import Quantity, Role
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.tip_modes import TIP, TipModes

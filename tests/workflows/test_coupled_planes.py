@@ -12,9 +12,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.cut import CutSpec
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.multi_frequency import MultiFrequency
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.advise import advise

@@ -16,9 +16,8 @@ from rcsa_ident.io.settings.setups import tooling_of
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.stability.advice import highest_removal
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.result import RESERVE
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.workflows.advise import advise
 from rcsa_ident.workflows.tool_change import ToolChange

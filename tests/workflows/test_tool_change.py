@@ -19,11 +19,10 @@ from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.machine.speed_dependence import BLOCK, tips_over_speed
 from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.drawn_modes import of_draw
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict, tally
 from rcsa_ident.stability.lobes import DRAWS, both_directions, drawn_limits, stability_lobes
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.stability_map import stability_map
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes

@@ -15,10 +15,9 @@ from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.machine.speed_dependence import BLOCK
 from rcsa_ident.machine.turning_machine import TurningMachine
 from rcsa_ident.setup.cut import CutSpec
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
 from rcsa_ident.stability.lobes import drawn_limits, stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.surface_error import surface_location_error
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.virtual.limit import true_limit

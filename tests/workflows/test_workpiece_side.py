@@ -20,7 +20,7 @@ from rcsa_ident.io.settings.setups import read_campaign, read_tooling
 from rcsa_ident.machine.workpiece_side import WorkpieceAxis, WorkpieceSide
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.signals.recording import Role
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.tip_modes import TipModes

@@ -21,7 +21,7 @@ from rcsa_ident.stability.labels.label_posterior import LabelModel, LabelPosteri
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
-from rcsa_ident.stability.methods import METHODS
+from rcsa_ident.stability.lobes import METHODS
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.version import __version__
 

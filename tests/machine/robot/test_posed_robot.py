@@ -19,7 +19,7 @@ from rcsa_ident.machine.robot.compliance import static_compliance
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.machine.robot.kinematics import tool_point_at
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TIP, TipModes
 from rcsa_ident.tool_holder.model import tool_holder_structure

@@ -15,7 +15,7 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import BareCutter
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from rcsa_ident.workflows.paths.removal import field_of, remove_along

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.coupling import _kernels as kernels
+from rcsa_ident.machine import _kernels as kernels
 
 LINES, STEPS = 11, 4
 
