@@ -210,7 +210,7 @@ def test_what_a_job_keeps_is_documented(done):
         "AxisSearch",
         "Candidate",
         "Layout",
-        "ModalBlock",
+        "AxisLayout",
         "Step",
     }
     names = [name for job, name in engine.computed if job == id]
