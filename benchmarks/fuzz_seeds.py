@@ -235,7 +235,7 @@ def robot_results(folder: Path) -> str:
     }
     rival = {"modes": 0, "unknowns": [0.1] * PosedLayout(springs, bodies, 0).size}
     top = {"kind": "robot", "schema_version": 1, "status": "converged", "robot": robot_keys(sheet), "tilts": False}
-    from rcsa_ident.io.results.parts import robot_results
+    from rcsa_ident.io.results import robot_results
 
     top |= {"kind": robot_results.KIND, "schema_version": robot_results.SCHEMA_VERSION}
     return json.dumps(plain(top | {"posterior": table | {"rivals": [rival]}}))

@@ -43,7 +43,7 @@ def case(data, seed, change=0.0, kind=None):
     vector, whole, oblique, turning = across(theta, layout)
     rng = np.random.default_rng(seed)
     if kind is not None:
-        place = {"oblique": oblique & (np.arange(vector.size) < whole.shapes.stop), "gyroscopic": turning}[kind]
+        place = {"oblique": oblique & (np.arange(vector.size) < whole.block.parts["shapes"].stop), "gyroscopic": turning}[kind]
         vector = vector + change * place * rng.choice([-1.0, 1.0], vector.size)
     points = coupled_data(data)
     axes = []
