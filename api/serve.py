@@ -195,11 +195,13 @@ def _run(settings: object) -> None:
     from api.data_folder import alone
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
+    from api.processes import share_heaps
     from api.settings import Settings
     from api.tls import Certificate
 
     assert isinstance(settings, Settings)
     log_lines.start()
+    share_heaps()
     with ExitStack() as held:
         try:
             held.enter_context(alone(settings.data))
