@@ -177,7 +177,7 @@ class EngagementMap(Shown):
     `z` [m], shape (n,): heights above the tip, never falling; one that stands several times has several arcs
     `start`, `end` [rad], shape (n,): of each arc. Between heights that have as many arcs they change on straight lines, else those of the
         lower one go on; below the first height and above the last one nothing is cut.
-    `feed_rise`: float [rad], default 0; angle between the feed and the plane across the tool's axis, towards the spindle
+    `feed_rise` [rad], default 0: angle between the feed and the plane across the tool's axis, towards the spindle
     """
 
     z: FloatArray
@@ -268,7 +268,7 @@ class CuttingConditions(Shown):
     """A cut with constant conditions.
 
     `spindle_speed` [rad/s]; `axial_depth` [m]; `feed_per_tooth` [m]
-    `feed_angle`: float [rad], default 0; direction of the feed in the machine's X-Y plane, from +X towards +Y
+    `feed_angle` [rad], default 0: direction of the feed in the machine's X-Y plane, from +X towards +Y
     """
 
     spindle_speed: float

@@ -100,7 +100,6 @@ class Table:
         """Return what stands under `key`; without a default the key must be there.
 
         `allowed`: what could stand there, in words
-        `default`: object
         `schema`: the same in JSON Schema
         """
         if self._asked is not None:
@@ -127,7 +126,6 @@ class Table:
         """Return a finite number within its range, as int if `whole`, else as float; a default is returned unchecked.
 
         `unit`: for the message
-        `default`: object
         `above`, `least`, `most`: limits: `above` is not allowed itself, the others are
         """
         limits = [f"above {above:g}" if above is not None else "", f"at least {least:g}" if least is not None else ""]
@@ -150,7 +148,7 @@ class Table:
         return int(number) if whole else number
 
     def quantity(self, key: str, kind: Range, default: Any = NEEDED) -> Any:
-        """Return a number in its own unit that is possible for a quantity; a default is returned unchecked. `default`: object."""
+        """Return a number in its own unit that is possible for a quantity; a default is returned unchecked."""
         value = self.number(key, kind.unit, default)
         if self._asked is not None:
             words = f"Usual are {kind.usual[0]:g} to {kind.usual[1]:g}"
@@ -230,7 +228,6 @@ class Table:
     def text(self, key: str, default: Any = NEEDED, choices: Collection[str] = (), allowed: str = "a text", names_of: str = "") -> Any:
         """Return a non-empty text, one of `choices` if there are any; a default is returned unchecked.
 
-        `default`: object
         `allowed`: what could stand there, in words, where there are no choices
         `names_of`: table of the file whose keys are choices, where there is one
         """
@@ -259,7 +256,7 @@ class Table:
         return list(found)
 
     def table(self, key: str, known: Collection[str] | None = None, default: Any = NEEDED) -> Table:
-        """Return the table under `key`. `known`: keys that the table may have; by default any. `default`: mapping."""
+        """Return the table under `key`. `known`: keys that the table may have; by default any."""
         return Table(self.value(key, f"a table [{self.name(key)}]", default, {"table": self.name(key)}), self.where, self.name(key), known)
 
     def tables(self, key: str, known: Collection[str] | None = None) -> list[Table]:
@@ -274,7 +271,6 @@ class Table:
         """Return the tables below `key` by their own names.
 
         `known`: keys that each of them may have; by default any
-        `default`: mapping
         """
         outer = self.table(key, None, default)
         return {name: Table(item, self.where, outer.name(name), known) for name, item in outer.data.items()}

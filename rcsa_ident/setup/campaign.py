@@ -33,7 +33,7 @@ class HammerTest(Shown):
     `record`: number of the FRF in the file, from 1, where it holds several
     `units`: of a file that does not tell its own, as ``um/N``
     `standstill`: bool, default True; the spindle did not turn
-    `sensor_mass`: float, default 0 [kg]; fixed to the tool-holder where the response is measured
+    `sensor_mass` [kg], default 0: fixed to the tool-holder where the response is measured
     `band`: (float, float) [Hz]; lines that are used
     `error` [-]: standard deviation of each line beside its noise, as a share
     `correction`: of an FRF that was measured with a reversed sensor, or written conjugated

@@ -62,7 +62,7 @@ def trigger_edge(
     `window`: slice, where the speed was found, if not in the whole record
     `deviation` [rad]: of the spindle's angle in the window from that at this speed, where it does not turn evenly; the time is that at
         which the edge would come if it did
-    Returns (float, float) [s] or None: None without a trigger, or if its edges do not come at the spindle's pace.
+    Returns (float, float) [s], or None without a trigger, or if its edges do not come at the spindle's pace.
     """
     found = recording.channel(Quantity.TRIGGER, None, window)
     if found is None:

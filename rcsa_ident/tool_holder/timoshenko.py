@@ -55,7 +55,7 @@ class Section:
     `mass` [kg/m]
     `rotary` [kg m]: rotary inertia rho I per length
     `loss_factor` [-]
-    `shear_loss_factor`: float [-], default `loss_factor`; where several materials bend as one, shear may lose another share than bending
+    `shear_loss_factor` [-], default `loss_factor`: where several materials bend as one, shear may lose another share than bending
     """
 
     bending: float | FloatArray

@@ -126,7 +126,7 @@ class Cut:
     `depth` [m]: axial, from the tip up
     `spindle_speed` [rad/s]
     `slices`: int, default 6; of what stands between bottom and depth
-    `bottom`: float, default 0 [m]; height above the tip below which there is no material beside the path
+    `bottom` [m], default 0: height above the tip below which there is no material beside the path
     """
 
     cutter: Cutter

@@ -36,7 +36,7 @@ class Sweep(Shown):
     are cut up into places, within a tolerance.
 
     `field`: cut in place
-    `tolerance`: float [m], default a hundredth of the distance between lines; by which the cut surface may stand off the exact one
+    `tolerance` [m], default a hundredth of the distance between lines: by which the cut surface may stand off the exact one
 
     Examples
     --------

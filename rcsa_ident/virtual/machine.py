@@ -22,8 +22,8 @@ class Bearing:
     `position` [m]: distance from the spindle's flange face towards the rear
     `stiffness`: two floats [N/m], stiffness at standstill along the two principal directions, X and Y where these are not turned
     `damping`: two floats [N s/m], along the same
-    `softening`: float [s/rad], default 0; share of the stiffness lost per spindle speed: k = k0 (1 - softening Omega)
-    `angle`: float [rad], default 0; of the principal directions about the spindle's axis, from +X towards +Y
+    `softening` [s/rad], default 0: share of the stiffness lost per spindle speed: k = k0 (1 - softening Omega)
+    `angle` [rad], default 0: of the principal directions about the spindle's axis, from +X towards +Y
     """
 
     position: float
@@ -49,7 +49,7 @@ class Housing:
     `mass` [kg]; `inertia` [kg m^2]
     `stiffness`, `damping`: two floats [N/m], [N s/m]; along the two principal directions, X and Y where these are not turned
     `tilting_stiffness`, `tilting_damping`: two floats [N m/rad], [N m s/rad]; in the planes of the same
-    `angle`: float [rad], default 0; of the principal directions about the spindle's axis, from +X towards +Y
+    `angle` [rad], default 0: of the principal directions about the spindle's axis, from +X towards +Y
     """
 
     position: float
