@@ -77,10 +77,7 @@ class Unknown(ValueError):
 def encode(value: Any) -> str:
     """Return a value as JSON.
 
-    Raises
-    ------
-    Unknown
-        It holds something else than numbers, texts, arrays of numbers, lists, tuples, tables and the nouns of `NOUNS`.
+    Raises `Unknown`: it holds something else than numbers, texts, arrays of numbers, lists, tuples, tables and the nouns of `NOUNS`.
     """
     return json.dumps(_plain(value), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
@@ -88,10 +85,7 @@ def encode(value: Any) -> str:
 def decode(text: str) -> Any:
     """Return the value that `encode` has written: same types, same bits, arrays of the same layout in memory.
 
-    Raises
-    ------
-    Unknown
-        If it has not, or its nouns have other fields now, or are gone.
+    Raises `Unknown` if it has not, or its nouns have other fields now, or are gone.
     """
     try:
         return _value(json.loads(text))

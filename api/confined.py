@@ -44,12 +44,8 @@ class Ended(Exception):
 class Confined:
     """A process that is started at once.
 
-    Parameters
-    ----------
-    serve : callable
-        What it does, with its `Line` and the arguments; importable by name.
-    *arguments
-        That can be pickled.
+    `serve`: what it does, with its `Line` and the arguments; importable by name
+    `*arguments`: that can be pickled
     """
 
     def __init__(self, serve: Callable[..., None], *arguments: Any) -> None:
@@ -86,13 +82,9 @@ class Confined:
     def receive(self, seconds: float) -> Any:
         """Return what it says next.
 
-        Raises
-        ------
-        TimeoutError
-            It has said nothing in time, and is killed.
-        ValueError
-            What it has said is no JSON, or too long.
-        Ended
+        Raises `TimeoutError`: it has said nothing in time, and is killed.
+        Raises `ValueError`: what it has said is no JSON, or too long.
+        Raises `Ended`.
         """
         late = threading.Event()
 
@@ -158,15 +150,8 @@ class Line:
     def apart(self, say: Callable[[], str]) -> int:
         """Have a copy of this process say something and end: nothing of what it does stays here.
 
-        Parameters
-        ----------
-        say : callable
-            Called in the copy; returns JSON.
-
-        Returns
-        -------
-        int
-            0, or the signal that has ended the copy before it had said anything; SIGABRT where what it has said is not one line.
+        `say`: called in the copy; returns JSON
+        Returns int: 0, or the signal that has ended the copy before it had said anything; SIGABRT where what it has said is not one line.
         """
         ours, theirs = os.pipe()
         copy = os.fork()

@@ -33,12 +33,8 @@ _TCP, _OUTSIDE = (1 << 2) - 1, (1 << 2) - 1
 class Confinement:
     """What holds in a process that has cut itself off.
 
-    Parameters
-    ----------
-    files : bool
-        It opens nothing but what it was told. From version 6 of Landlock it sends no signals either.
-    calls : bool
-        It makes no system call but those of `api.system_calls`: no socket, process, program, signal to others, change of a file's mode.
+    `files`: it opens nothing but what it was told. From version 6 of Landlock it sends no signals either.
+    `calls`: it makes no system call but those of `api.system_calls`: no socket, process, program, signal to others, change of a file's mode
     """
 
     files: bool = False
@@ -60,12 +56,8 @@ class Confinement:
 def confine(readable: Iterable[Path] | None, writable: Iterable[Path] = ()) -> Confinement:
     """Cut this process off; to be called by its only thread, for those that run already are not reached.
 
-    Parameters
-    ----------
-    readable : iterable of Path or None
-        Files, and folders with all below them, that may still be read. Python's own are, too. None closes no file.
-    writable : iterable of Path
-        Folders in which files may be read, made, written and removed.
+    `readable`: files, and folders with all below them, that may still be read. Python's own are, too. None closes no file.
+    `writable`: folders in which files may be read, made, written and removed
     """
     if sys.platform != "linux":
         return Confinement()

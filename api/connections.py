@@ -33,13 +33,7 @@ def network_of(address: str) -> str:
 
 
 class Connections:
-    """Count of open connections.
-
-    Parameters
-    ----------
-    most, most_per_address : int
-        A further one is closed at once.
-    """
+    """Count of open connections. `most`, `most_per_address`: a further one is closed at once."""
 
     def __init__(self, most: int = 800, most_per_address: int = 400) -> None:
         self.most, self.most_per_address = most, most_per_address

@@ -84,10 +84,7 @@ def unchanged(request: Request, digest: str) -> bool:
 def expected(request: Request, there: Callable[[], str | None]) -> str | None:
     """Return the digest that a conditional write expects: `ABSENT` with If-None-Match: *, None without a condition.
 
-    Parameters
-    ----------
-    there : callable
-        Returns the current digest; called for If-Match: * only.
+    `there`: returns the current digest; called for If-Match: * only
     """
     if request.headers.get("if-none-match", "").strip() == "*":
         return ABSENT
@@ -122,11 +119,8 @@ def in_use(taken: Taken, name: str | None, repeat: str | None) -> Problem:
 async def while_there(request: Request, answer: Coroutine[Any, Any, Item]) -> Item:
     """Return an answer, which is given up as soon as the client of the request has left.
 
-    Parameters
-    ----------
-    request : Request
-        Whose body has been read.
-    answer : coroutine
+    `request`: whose body has been read
+    `answer`: coroutine
     """
 
     async def leaving() -> None:

@@ -26,9 +26,7 @@ def make(folder: Path) -> None:
 def check(folder: Path) -> None:
     """Refuse a folder whose databases are damaged, and one that has lost its store: a new one would forget what is left.
 
-    Raises
-    ------
-    InputError
+    Raises `InputError`.
     """
     mend = f"a whole store in {folder}: restore a backup into a new folder (rcsa-ident-serve restore)"
     lost = not (folder / STORE).is_file() or (folder / STORE).stat().st_size == 0
@@ -54,10 +52,7 @@ def check(folder: Path) -> None:
 def alone(folder: Path) -> Iterator[None]:
     """Hold a data folder as its only service; the system lets go of it however the process ends.
 
-    Raises
-    ------
-    InputError
-        Another service holds it.
+    Raises `InputError`: another service holds it.
     """
     make(folder)
     with held(folder / LOCK) as first:

@@ -42,18 +42,11 @@ class Full(Exception):
 class Partial:
     """State of a resumable upload.
 
-    Parameters
-    ----------
-    offset : int [bytes]
-        Received and on the disk.
-    length : int [bytes]
-        Of the whole.
-    group, campaign, name : str
-        Where the whole belongs.
-    replacing : bool
-        Whether it takes the place of other content.
-    sha256 : str
-        That the whole has, as announced; empty where it is not.
+    `offset` [bytes]: received and on the disk
+    `length` [bytes]: of the whole
+    `group`, `campaign`, `name`: where the whole belongs
+    `replacing`: whether it takes the place of other content
+    `sha256`: that the whole has, as announced; empty where it is not
     """
 
     offset: int
@@ -71,14 +64,7 @@ class Partial:
 
 
 class Part:
-    """A file that is being written.
-
-    Parameters
-    ----------
-    path : Path
-    offset : int
-        Length to keep of an existing file; the rest is cut off.
-    """
+    """A file that is being written. `offset`: length to keep of an existing file; the rest is cut off."""
 
     def __init__(self, path: Path, offset: int = 0) -> None:
         self.path, self.size = path, offset
@@ -121,14 +107,9 @@ class Part:
 class Files:
     """Files of all groups.
 
-    Parameters
-    ----------
-    folder : Path
-        Made at the first upload.
-    group_bytes : int
-        Quota of a group.
-    free_bytes : int
-        Kept free on the disk.
+    `folder`: made at the first upload
+    `group_bytes`: quota of a group
+    `free_bytes`: kept free on the disk
     """
 
     def __init__(self, folder: Path, group_bytes: int = 1 << 62, free_bytes: int = 0) -> None:
@@ -253,10 +234,7 @@ class Files:
     def sweep(self, kept: Mapping[str, Container[tuple[str, str]]], now: float | None = None) -> int:
         """Remove stale parts and files that no row refers to, and return how many. The caller holds `lock`.
 
-        Parameters
-        ----------
-        kept : mapping of group to files
-            Files that rows refer to.
+        `kept`: mapping of group to files, files that rows refer to
         """
         # of a clock that jumps and one that cannot, the earlier: a part that is being written never looks older than it is
         now, count = min(time.time(), self.began + time.monotonic()) if now is None else now, 0

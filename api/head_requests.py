@@ -9,11 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 class HeadRequests:
     """Middleware that asks the GET route of a path on HEAD, unless the path has an answer of its own to HEAD.
 
-    Parameters
-    ----------
-    app : ASGIApp
-    router : Router
-        Whose routes say what there is.
+    `router`: whose routes say what there is
     """
 
     def __init__(self, app: ASGIApp, router: Router) -> None:

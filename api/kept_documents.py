@@ -19,17 +19,10 @@ TOML, JSON = "application/toml", "application/json"
 def text_of_body(request: Request, raw: bytes, keys: type[Body], largest: int, what: str) -> str:
     """Return a file's text from a body that holds it, or its keys as JSON.
 
-    Parameters
-    ----------
-    request : Request
-    raw : bytes
-        The body.
-    keys : type of Body
-        Of the file.
-    largest : int
-        Bytes at most.
-    what : str
-        It is, for the message.
+    `raw`: the body
+    `keys`: of the file
+    `largest`: bytes at most
+    `what`: it is, for the message
     """
     if len(raw) > largest:
         raise Problem(413, f"a {what} has at most {largest // 1000} kB")

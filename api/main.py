@@ -89,13 +89,8 @@ def create_app(
 ) -> FastAPI:
     """Return the service.
 
-    Parameters
-    ----------
-    settings : Settings
-    store, work, reader, host : optional
-        Replace the database and the processes that the settings name.
-    supervisor : Supervisor, optional
-        Of the job workers; without one, jobs wait for workers that run elsewhere.
+    `store`, `work`, `reader`, `host`: replace the database and the processes that the settings name
+    `supervisor`: of the job workers; without one, jobs wait for workers that run elsewhere
     """
     if store is None and not settings.database:
         data_folder.make(settings.data)

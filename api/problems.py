@@ -45,15 +45,7 @@ _TITLES = {413: "Content too large", 422: "Input not usable", 460: "Checksum mis
 
 
 class Problem(Exception):
-    """An error answer.
-
-    Parameters
-    ----------
-    status : int
-    detail : str
-    errors : sequence of {field, found, allowed}
-    headers : mapping of str to str
-    """
+    """An error answer. `errors`: sequence of {field, found, allowed}."""
 
     def __init__(
         self, status: int, detail: str, errors: Sequence[Mapping[str, str]] = (), headers: Mapping[str, str] | None = None

@@ -103,13 +103,8 @@ def held(path: Path) -> Iterator[bool]:
 class Child(SpawnProcess):
     """A process that is started at once and follows its parent.
 
-    Parameters
-    ----------
-    call : callable
-        What it does; importable by name.
-    *arguments
-        That cross processes.
-    name : str
+    `call`: what it does; importable by name
+    `*arguments`: that cross processes
     """
 
     def __init__(self, call: Callable[..., None], *arguments: Any, name: str) -> None:
@@ -141,10 +136,7 @@ class Child(SpawnProcess):
 class BackOff:
     """The pause before a child is started again: none at first, then 1, 2, 4 … 30 s while it fails soon after each start.
 
-    Parameters
-    ----------
-    at_once : int
-        Restarts in succession that come without a pause.
+    `at_once`: restarts in succession that come without a pause
     """
 
     def __init__(self, at_once: int = 1) -> None:

@@ -11,14 +11,7 @@ MOST_BUCKETS = 10_000
 
 
 class Rates:
-    """Token-bucket rate limiter, one bucket per key: `burst` at once, refilled at `per_minute`.
-
-    Parameters
-    ----------
-    per_minute, burst : int
-    clock : callable
-        Monotonic clock [s].
-    """
+    """Token-bucket rate limiter, one bucket per key: `burst` at once, refilled at `per_minute`. `clock`: monotonic clock [s]."""
 
     def __init__(self, per_minute: int, burst: int, clock: Callable[[], float] = time.monotonic) -> None:
         self.rate, self.burst, self.clock = per_minute / 60.0, float(burst), clock

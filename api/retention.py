@@ -18,12 +18,8 @@ _ROUND = 3600.0
 class Lifetimes:
     """How long things are kept; 0 keeps them for ever.
 
-    Parameters
-    ----------
-    events, results : float [days]
-        Of jobs, after their end.
-    versions : float [days]
-        Entries of the trail with the texts of their versions, except the newest of each thing.
+    `events`, `results` [days]: of jobs, after their end
+    `versions` [days]: entries of the trail with the texts of their versions, except the newest of each thing
     """
 
     events: float = 0.0

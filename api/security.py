@@ -49,17 +49,7 @@ _LOCAL_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNO
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """The caller of a route, known by an API key.
-
-    Parameters
-    ----------
-    id : str
-        Of the key.
-    group : str
-    scopes : tuple of str
-    name : str
-        Of the key, as people call it.
-    """
+    """The caller of a route, known by an API key. `id`: of the key. `name`: of the key, as people call it."""
 
     id: str
     group: str
@@ -127,10 +117,7 @@ async def admitted(request: HTTPConnection, components: Components, given: str |
 def caller_of(request: HTTPConnection, components: Components, given: str | None = None) -> Caller:
     """Return the caller; without a key only where none is required.
 
-    Parameters
-    ----------
-    given : str, optional
-        A key from elsewhere than the header, which a page cannot set on a WebSocket.
+    `given`: a key from elsewhere than the header, which a page cannot set on a WebSocket
     """
     text = request.headers.get(HEADER, "") or given or ""
     if not text and not components.settings.asks_for_keys:

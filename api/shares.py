@@ -19,12 +19,8 @@ class Shares:
 
     One group alone gets half of them, the next one half of the rest: who comes later finds a place, and nobody's is taken away.
 
-    Parameters
-    ----------
-    most : int
-        Places.
-    several : bool
-        Whether there can be more groups than one; one alone may take all of them.
+    `most`: places
+    `several`: whether there can be more groups than one; one alone may take all of them
     """
 
     def __init__(self, most: int, several: bool = True) -> None:
@@ -54,14 +50,9 @@ class Shares:
 class FairThreads(ThreadPoolExecutor):
     """Threads whose next call is of the group that has fewest at work, among these of the one that waits longest since its last.
 
-    Parameters
-    ----------
-    count : int
-        Calls at work at once.
-    name : str
-    spare : bool
-        Whether one thread more answers a short call while all at work are long ones: what takes milliseconds waits behind nothing that
-        takes seconds.
+    `count`: calls at work at once
+    `spare`: whether one thread more answers a short call while all at work are long ones: what takes milliseconds waits behind nothing that
+        takes seconds
     """
 
     def __init__(self, count: int, name: str, spare: bool = False) -> None:

@@ -17,17 +17,9 @@ LOOK = 10.0
 class Certificate:
     """Certificate of the service; connections that begin after its files have changed get the new one.
 
-    Parameters
-    ----------
-    certificate, key : Path
-        PEM files: the chain, the service's own first, and its private key without a passphrase.
-    look : float [s]
-        Interval between two looks at the files.
-
-    Raises
-    ------
-    InputError
-        The files are no certificate and its key.
+    `certificate`, `key`: PEM files: the chain, the service's own first, and its private key without a passphrase
+    `look` [s]: interval between two looks at the files
+    Raises `InputError`: the files are no certificate and its key.
     """
 
     def __init__(self, certificate: Path, key: Path, look: float = LOOK) -> None:

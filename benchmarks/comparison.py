@@ -47,13 +47,8 @@ def coverage(z: FloatArray) -> dict[str, float]:
 def compared(machine: Machine | None, setup: MachineFile, truth: Path) -> dict[str, dict[str, Any]]:
     """Return errors [X, Y] and coverage of the tooltip FRFs of the toolings that cut and of those that never did.
 
-    Parameters
-    ----------
-    machine : Machine or None
-        None, of a failed identification, predicts no motion.
-    setup : MachineFile
-    truth : Path
-        The campaign's; at the mean of the speeds.
+    `machine`: None, of a failed identification, predicts no motion
+    `truth`: the campaign's; at the mean of the speeds
     """
     found: dict[str, dict[str, Any]] = {}
     for kind, paths in _kinds(setup).items():
@@ -85,13 +80,8 @@ def compared_at_speeds(machine: Machine | None, setup: MachineFile, truth: Path)
     own norm, ||dC_XY|| / ||C_XY||: of each tooling the worse of both at the worst of the speeds. ``bands`` are over all speeds and
     over all terms that have one.
 
-    Parameters
-    ----------
-    machine : Machine or None
-        None, of a failed identification, predicts no motion.
-    setup : MachineFile
-    truth : Path
-        The campaign's.
+    `machine`: None, of a failed identification, predicts no motion
+    `truth`: the campaign's
     """
     programmed = setup.plan.spindle_speeds
     mean = float(np.mean(programmed))

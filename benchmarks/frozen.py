@@ -105,10 +105,7 @@ _TIME = re.compile(r"\b\d+(?:\.\d+)? s\b")
 def commands(mass: float) -> Iterator[str]:
     """Yield all command lines: the table, lobes by each method on each tip, help of every command, schemas.
 
-    Parameters
-    ----------
-    mass : float [g]
-        Of the tool that rings.
+    `mass` [g]: of the tool that rings
     """
     yield from _COMMANDS.format(**_WORDS, mass=f"{mass:.6f}").strip().splitlines()
     for (name, tip), method in itertools.product(TIPS.items(), METHODS):

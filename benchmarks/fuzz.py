@@ -96,16 +96,7 @@ def _sow(folder: Path, name: str) -> None:
 
 
 class _Turn:
-    """A turn of one reader: calls it until its time is over.
-
-    Parameters
-    ----------
-    name : str
-    folder : Path
-    seconds : float
-        Of a core.
-    seed : int
-    """
+    """A turn of one reader: calls it until its time is over. `seconds`: of a core."""
 
     def __init__(self, name: str, folder: Path, seconds: float, seed: int) -> None:
         self.name, self.folder, self.seconds, self.seed = name, folder, seconds, seed

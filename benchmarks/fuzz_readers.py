@@ -23,14 +23,9 @@ Read = Callable[[bytes, Path], object]
 class Target(NamedTuple):
     """A reader as the fuzzer sees it.
 
-    Parameters
-    ----------
-    read : callable of (bytes, folder)
-        Raises `InputError` or a `Problem` where it refuses; every other exception is a find.
-    sown : callable of (folder)
-        Returns seeds, which it takes or nearly takes.
-    kind : str
-        What the bytes are, for those who change them: bytes, text, json or toml.
+    `read`: callable of (bytes, folder); raises `InputError` or a `Problem` where it refuses; every other exception is a find
+    `sown`: callable of (folder), returns seeds, which it takes or nearly takes
+    `kind`: what the bytes are, for those who change them: bytes, text, json or toml
     """
 
     read: Read

@@ -52,14 +52,9 @@ KINDS, KEYS = ("cut", "same", "other"), ("machine", "ideal", "level", "told")
 class Ideal:
     """What is taken away, and the cause that should be named in first place.
 
-    Parameters
-    ----------
-    cause : str
-        Empty: none.
-    seen_at : float [m]
-    changes : Changes
-    soft : float [-]
-        Factor on the flange joint's stiffness.
+    `cause`: empty: none
+    `seen_at` [m]
+    `soft` [-]: factor on the flange joint's stiffness
     """
 
     cause: str = ""

@@ -21,13 +21,8 @@ SOFTENING = 0.01 / from_rpm(1000.0)
 class Score:
     """How well probabilities told labels.
 
-    Parameters
-    ----------
-    right, cuts : float
-    log_score : float
-        Mean logarithm of the probability of what was seen.
-    expected : float
-        Accuracy that the probabilities themselves expect.
+    `log_score`: mean logarithm of the probability of what was seen
+    `expected`: accuracy that the probabilities themselves expect
     """
 
     right: float

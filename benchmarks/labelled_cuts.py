@@ -91,12 +91,7 @@ def limits_of(softening: float = 0.0) -> TipLimits:
 class Pool:
     """Draws of the prior with their limits at all tested speeds; a draw that is new is computed.
 
-    Parameters
-    ----------
-    z : array, shape (d, size)
-    speeds : array, shape (n,) [rad/s]
-    log_limit : array, shape (d, n)
-    softening : float [s/rad]
+    `z`, shape (d, size); `speeds` [rad/s], shape (n,); `log_limit`, shape (d, n); `softening` [s/rad]
     """
 
     z: FloatArray

@@ -21,18 +21,10 @@ _CHATTER = (0.4, 8.0)
 class MadeUp(NamedTuple):
     """A record and what it was made of.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    quantity : Quantity
-    teeth : int
-    spindle : float [Hz]
-        Mean frequency.
-    chatter : float or None [Hz]
-        Its mean frequency.
-    kind : str
-        What stands out beside the orders.
+    `samples`, shape (n, c); `rate` [Hz]
+    `spindle` [Hz]: mean frequency
+    `chatter` [Hz]: its mean frequency
+    `kind`: what stands out beside the orders
     """
 
     samples: FloatArray
@@ -63,13 +55,7 @@ def _resonant(rng: np.random.Generator, n: int, rate: float, frequency: float, d
 
 
 def draw(seed: int, seconds: float = 6.0) -> MadeUp:
-    """Return the record of a seed: every second one chatters.
-
-    Parameters
-    ----------
-    seed : int
-    seconds : float [s]
-    """
+    """Return the record of a seed: every second one chatters. `seconds` [s]."""
     rng = np.random.default_rng([39, seed])
     rate, rpm, teeth = float(rng.choice(_RATES)), _log_uniform(rng, *_SPEEDS), int(rng.integers(2, 7))
     quantity = Quantity.SOUND if rng.uniform() < 0.4 else Quantity.ACCELERATION

@@ -68,15 +68,7 @@ TEETH, LAST = 300, 30
 
 @dataclass(slots=True)
 class Truth:
-    """A tooling on a virtual machine.
-
-    Parameters
-    ----------
-    setup : MachineFile
-    tooling : Tooling
-    kept : Path
-        Where true limits are written to and read from.
-    """
+    """A tooling on a virtual machine. `kept`: where true limits are written to and read from."""
 
     setup: MachineFile
     tooling: Tooling

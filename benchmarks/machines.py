@@ -50,25 +50,15 @@ ENTRY = 0.05
 class Condition(NamedTuple):
     """What tells the campaigns of one machine apart.
 
-    Parameters
-    ----------
-    trigger : bool
-    noise : float
-        Factor on the noise of gap and accelerometer.
-    disturbances : Disturbances or None
-        Where there are some, each cut enters and leaves the material in its record, too.
-    clock : str
-        What is told of the recorder's clock: ``exactly``, ``from the speeds`` (what the identification's remark proposes) or ``nothing``.
-    campaign : str
-        The condition whose records are taken, where they are the same.
-    toolings : int
-        That cut: with 3 the similar one is among them.
-    housing : float or None [m]
-        Where on the spindle's housing accelerometers are the only sensors, from the flange's face; None where the flange is seen.
-    beside : float or None [m]
-        Where on the housing a further pair of accelerometers stands beside all other sensors; None for none.
-    passes : int
-        Of four seconds each that take the place of a tooling's 40 cuts, from 8000 to 20000 rev/min one after the other; 0 for none.
+    `noise`: factor on the noise of gap and accelerometer
+    `disturbances`: where there are some, each cut enters and leaves the material in its record, too
+    `clock`: what is told of the recorder's clock: ``exactly``, ``from the speeds`` (what the identification's remark proposes) or
+        ``nothing``
+    `campaign`: the condition whose records are taken, where they are the same
+    `toolings`: that cut: with 3 the similar one is among them
+    `housing` [m]: where on the spindle's housing accelerometers are the only sensors, from the flange's face; None where the flange is seen
+    `beside` [m]: where on the housing a further pair of accelerometers stands beside all other sensors; None for none
+    `passes`: of four seconds each that take the place of a tooling's 40 cuts, from 8000 to 20000 rev/min one after the other; 0 for none
     """
 
     trigger: bool = False
@@ -168,14 +158,9 @@ Tool = dict[str, Any]
 def random_machine(seed: int, folder: Path, coupled: bool = False) -> Path:
     """Draw a machine with its toolings, write both into `folder`, and return the machine file; same seed, same files.
 
-    Parameters
-    ----------
-    seed : int
-    folder : Path
-        Made if it is not there.
-    coupled : bool
-        Turn housing and bearings by angles of their own, drawn evenly within +-`TURNED`, and let gyroscopic moments act; all else is as
-        the same seed draws it without, but for the depth of cut.
+    `folder`: made if it is not there
+    `coupled`: turn housing and bearings by angles of their own, drawn evenly within +-`TURNED`, and let gyroscopic moments act; all else is
+        as the same seed draws it without, but for the depth of cut
     """
     rngs = np.random.default_rng(seed).spawn(6)
     turn = rngs[5] if coupled else None

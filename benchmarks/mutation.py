@@ -56,15 +56,9 @@ _NAMED = {
 class Mutant(NamedTuple):
     """A change at one place.
 
-    Parameters
-    ----------
-    function : str
-        Qualified name of the outermost function around it.
-    line : int
-    before, after : str
-        The smallest expression around it.
-    tree : callable
-        Returns the module with the change, which few of all mutants are asked for.
+    `function`: qualified name of the outermost function around it
+    `before`, `after`: the smallest expression around it
+    `tree`: returns the module with the change, which few of all mutants are asked for
     """
 
     function: str
@@ -109,19 +103,11 @@ def score(
 ) -> tuple[int, int, int, float]:
     """Return how many mutants were noticed, how many were not, how many of these change nothing, and the time all took [s].
 
-    Parameters
-    ----------
-    module : str
-        File of the module, from the repository's root.
-    tests : list of str
-        Files of its tests.
-    most : int
-        Mutants that are tried, chosen by the seed.
-    seed : int
-    line : int or None
-        Of the mutants that are tried, where not all are meant.
-    seconds : float
-        After which no further one is tried.
+    `module`: file of the module, from the repository's root
+    `tests`: files of its tests
+    `most`: mutants that are tried, chosen by the seed
+    `line`: of the mutants that are tried, where not all are meant
+    `seconds`: after which no further one is tried
     """
     source = (ROOT / module).read_text(encoding="utf-8")
     found = [mutant for mutant in mutants(source) if line is None or mutant.line == line]
@@ -139,12 +125,7 @@ def score(
 class _Trial:
     """A plugin of pytest: in the place of one run of the collected tests there is one for every mutant, each in a fork.
 
-    Parameters
-    ----------
-    module : str
-    chosen : list of Mutant
-    seconds : float
-        After which no further one is tried.
+    `seconds`: after which no further one is tried
     """
 
     def __init__(self, module: str, chosen: list[Mutant], seconds: float) -> None:

@@ -29,17 +29,10 @@ RATE = 48_000.0
 class Room:
     """What a recording adds.
 
-    Parameters
-    ----------
-    noise : float [-]
-        Root mean square over the peak of the loudest ring.
-    reflections : float [-]
-        Amplitude of the first ones over the direct sound.
-    tail : float [-]
-        Amplitude of the room's tail at its beginning.
-    reverberation : float [s]
-        In which the tail falls by 60 dB.
-    gain_control : bool
+    `noise` [-]: root mean square over the peak of the loudest ring
+    `reflections` [-]: amplitude of the first ones over the direct sound
+    `tail` [-]: amplitude of the room's tail at its beginning
+    `reverberation` [s]: in which the tail falls by 60 dB
     """
 
     noise: float = 1e-3
@@ -50,14 +43,7 @@ class Room:
 
 
 def hanging(tooling: Tooling, rng: np.random.Generator) -> ToolAssembly:
-    """Return the tooling as it truly hangs there, with what its drawing leaves out.
-
-    Parameters
-    ----------
-    tooling : Tooling
-        With its true dimensions.
-    rng : Generator
-    """
+    """Return the tooling as it truly hangs there, with what its drawing leaves out. `tooling`: with its true dimensions."""
     assembly = tooling.assembly
     steel = MATERIALS["steel"]
     front, *others = assembly.holder
@@ -109,15 +95,8 @@ def _fluted(tool: Sequence[BeamSegment], rng: np.random.Generator) -> tuple[Beam
 def sound(body: ToolAssembly, rng: np.random.Generator, hits: int = 5, room: Room | None = None, planes: float = 0.002) -> FloatArray:
     """Return what a phone hears of a body that is tapped at its tip, full scale 1, at `RATE`.
 
-    Parameters
-    ----------
-    body : ToolAssembly
-    rng : Generator
-    hits : int
-        One in 0.7 s.
-    room : Room, optional
-    planes : float [-]
-        By what share the two bending planes differ at most.
+    `hits`: one in 0.7 s
+    `planes` [-]: by what share the two bending planes differ at most
     """
     room = Room() if room is None else room
     modes = _modes(body, rng, planes)

@@ -100,12 +100,9 @@ def interpolated(robot: VirtualRobot, tooling: Tooling, hit: FloatArray, asked: 
 def _gaussian_process(known: FloatArray, values: FloatArray, asked: FloatArray) -> FloatArray:
     """Return what a Gaussian process expects: squared exponential, a length scale for each input, white noise; best of three starts.
 
-    Parameters
-    ----------
-    known : array, shape (k, j)
-    values : array, shape (k, f)
-        Of unit variance.
-    asked : array, shape (a, j)
+    `known`, shape (k, j)
+    `values`, shape (k, f): of unit variance
+    `asked`, shape (a, j)
     """
     k, columns = values.shape
     gram = values @ values.T

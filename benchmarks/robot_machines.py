@@ -50,14 +50,7 @@ def sheet() -> RobotModel:
 
 
 def drawn(seed: int, masses: float = MASSES) -> VirtualRobot:
-    """Return a robot.
-
-    Parameters
-    ----------
-    seed : int
-    masses : float
-        Spread of the logarithm of each link's mass.
-    """
+    """Return a robot. `masses`: spread of the logarithm of each link's mass."""
     rng = np.random.default_rng(seed)
 
     def factor(spread: float) -> float:

@@ -42,13 +42,8 @@ KINDS = {"first": "cut", "second": "cut", "similar": "never cut, same holder", "
 def identified(scratch: Path, seed: int, exact: bool) -> dict[str, Any]:
     """Return a row: errors and bands of one machine's toolings.
 
-    Parameters
-    ----------
-    scratch : Path
-    seed : int
-        Of the machine.
-    exact : bool
-        Take all drawings for exact, as the package did before it knew of spreads.
+    `seed`: of the machine
+    `exact`: take all drawings for exact, as the package did before it knew of spreads
     """
     warm()
     machine, folder = rough_campaign(scratch, seed)

@@ -61,16 +61,10 @@ class _RoughPlan(CutPlan):
 class RoughMachine:
     """What is told of a machine, and what is true.
 
-    Parameters
-    ----------
-    told : MachineFile
-    toolings : mapping of name to Tooling
-        As drawn: those of the cuts, then those that never cut.
-    true : mapping of name to (MachineFile, Tooling)
-        The machine as each of them is clamped in it, and the tooling as it is.
-    alterations : mapping of name to Alteration
-    gains, cross_talk : (float, float) [-]
-        Of the gap sensors of X and Y.
+    `toolings`: mapping of name to Tooling, as drawn: those of the cuts, then those that never cut
+    `true`: mapping of name to (MachineFile, Tooling); the machine as each of them is clamped in it, and the tooling as it is
+    `alterations`: mapping of name to Alteration
+    `gains`, `cross_talk`: (float, float) [-]; of the gap sensors of X and Y
     """
 
     told: MachineFile
@@ -183,16 +177,9 @@ def rough_campaign(
 ) -> tuple[RoughMachine, Path]:
     """Return a rough machine and the folder of its campaign, simulated if it is not there.
 
-    Parameters
-    ----------
-    scratch : Path
-    seed : int
-    cut : sequence of str
-        Toolings that cut.
-    name : str
-        Of the folder.
-    speeds : sequence of int, optional
-        Which of the plan's speeds, by their number; all by default.
+    `cut`: toolings that cut
+    `name`: of the folder
+    `speeds`: which of the plan's speeds, by their number; all by default
     """
     machine = rough_machine(scratch, seed)
     folder = scratch / f"rough-{seed}" / name

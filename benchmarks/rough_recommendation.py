@@ -39,15 +39,9 @@ CUTS, AGAIN = 5, 2000
 def case(machine: RoughMachine, answer: TipSource, name: str, rng: np.random.Generator) -> dict[str, Any]:
     """Return what is recommended for a random cut of a tooling, and what is true of it.
 
-    Parameters
-    ----------
-    machine : RoughMachine
-    answer : TipSource
-        What was identified of it.
-    name : str
-        Of the tooling.
-    rng : Generator
-        Draws the cut.
+    `answer`: what was identified of it
+    `name`: of the tooling
+    `rng`: draws the cut
     """
     engagement, feed_angle, speeds = drawn_cut(rng)
     told = machine.told.workpiece.coefficients

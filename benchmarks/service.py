@@ -34,10 +34,7 @@ SECONDS, CLIENTS = 10.0, 2
 def run(result: Path | None = None) -> list[dict[str, Any]]:
     """Lobes with bands and without, as a machine at the presetting station asks, and reads.
 
-    Parameters
-    ----------
-    result : Path, optional
-        RESULT.json; by default a machine of seven modes an axis with a full posterior.
+    `result`: RESULT.json; by default a machine of seven modes an axis with a full posterior
     """
     text = machine_text() if result is None else result.read_text(encoding="utf-8")
     rows = []

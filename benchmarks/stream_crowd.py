@@ -58,15 +58,9 @@ def hello(machine: str, rate: float, **further: Any) -> dict[str, Any]:
 def crowd(streams: int, per_second: float, samples: int, lonely: bool) -> list[dict[str, Any]]:
     """Open streams and send each so many frames per second; return what a request of somebody else takes meanwhile.
 
-    Parameters
-    ----------
-    streams : int
-    per_second : float [1/s]
-        Frames of a stream.
-    samples : int
-        Of a frame.
-    lonely : bool
-        Whether every second frame is left out, so that no observer begins.
+    `per_second` [1/s]: frames of a stream
+    `samples`: of a frame
+    `lonely`: whether every second frame is left out, so that no observer begins
     """
     limits = {"RCSA_IDENT_STREAMS": str(streams), "RCSA_IDENT_STREAMS_PER_GROUP": str(streams)}
     with tempfile.TemporaryDirectory() as folder, serving(Path(folder), **limits) as (port, service):
@@ -114,14 +108,7 @@ def waited(port: int, seconds: float) -> list[float]:
 
 
 class Sender:
-    """The client of one stream.
-
-    Parameters
-    ----------
-    port : int
-    opening : str
-        Its first message.
-    """
+    """The client of one stream. `opening`: its first message."""
 
     def __init__(self, port: int, opening: str) -> None:
         self.link = socket.create_connection(("127.0.0.1", port))

@@ -175,10 +175,7 @@ def sensors_table(rows: Sequence[dict[str, Any]]) -> str:
 def coupled_table(rows: Sequence[dict[str, Any]]) -> str:
     """Return the coupled machines' part as Markdown: errors of XX, YY and of the cross terms, each at the worst of three speeds.
 
-    Parameters
-    ----------
-    rows : sequence of dict
-        With ``cross`` and ``cross_own`` beside ``errors`` of each kind of tooling.
+    `rows`: with ``cross`` and ``cross_own`` beside ``errors`` of each kind of tooling
     """
     members = [r for r in rows if r["method"] == "default"]
     lines = [

@@ -10,22 +10,13 @@ from typing import Any, NamedTuple
 class Race(NamedTuple):
     """One task, done by the package and by a peer in the same process, from the same input and to the accuracy that is told.
 
-    Parameters
-    ----------
-    claim : str
-        The task.
-    peer : str
-        What it is compared with, in words.
-    package : str
-        Distribution whose version counts.
-    ours, theirs : callable
-        Each does the task once.
-    accuracy : str
-        Of both.
-    parts : (int, int)
-        How many times a call of either does the task.
-    unit, scale : str, float
-        What a time is told in, and how many of these a second has.
+    `claim`: the task
+    `peer`: what it is compared with, in words
+    `package`: distribution whose version counts
+    `ours`, `theirs`: each does the task once
+    `accuracy`: of both
+    `parts`: (int, int); how many times a call of either does the task
+    `unit`, `scale`: what a time is told in, and how many of these a second has
     """
 
     claim: str

@@ -32,25 +32,13 @@ class Measure(StrEnum):
 class Case(NamedTuple):
     """One line of the page.
 
-    Parameters
-    ----------
-    name : str
-    source : str
-        Key of docs/references.bib in square brackets with its figure or table; of a file its name and public address.
-    expected : float, sequence or callable
-        As published; what a closed form or another program says is computed.
-    ours : callable
-        Returns as many values.
-    unit : str
-    tolerance : float or None
-        Of `measure`; not read where a value may be anything up to, or down to, the expected one. None where nothing holds the row.
-    test : str
-        Tests that hold it, or another command that shows it; where nothing holds it, why.
-    measure : Measure
-    slow : bool
-        Takes more than about two seconds.
-    needs : path or str or None
-        File that lies beside the project, or a module that it does not ask for.
+    `source`: key of docs/references.bib in square brackets with its figure or table; of a file its name and public address
+    `expected`: float, sequence or callable; as published; what a closed form or another program says is computed
+    `ours`: returns as many values
+    `tolerance`: of `measure`; not read where a value may be anything up to, or down to, the expected one. None where nothing holds the row.
+    `test`: tests that hold it, or another command that shows it; where nothing holds it, why
+    `slow`: takes more than about two seconds
+    `needs`: file that lies beside the project, or a module that it does not ask for
     """
 
     name: str

@@ -25,10 +25,7 @@ _LARGEST_MANIFEST = 1 << 28
 def restore(source: Path, data: Path) -> Account:
     """Restore a backup into a data folder.
 
-    Raises
-    ------
-    InputError
-        The folder is not empty, or the file is not a complete backup that this release can read.
+    Raises `InputError`: the folder is not empty, or the file is not a complete backup that this release can read.
     """
     if data.is_symlink() or (data.exists() and not (data.is_dir() and not any(data.iterdir()))):
         raise InputError("--data", f"{data.name} which is not empty", "a folder that is empty or does not exist yet")

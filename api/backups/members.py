@@ -20,14 +20,9 @@ MEMBER = re.compile(rf"service\.db|jobs\.db|manifest\.json|files/[0-9a-f]{{32}}/
 class Account:
     """Summary of a backup or of its restoring.
 
-    Parameters
-    ----------
-    files, bytes : int
-        Of all members together.
-    missing : tuple of str
-        Files that rows refer to but that do not exist.
-    damaged : tuple of str
-        Files whose content does not match its hash any more.
+    `files`, `bytes`: of all members together
+    `missing`: files that rows refer to but that do not exist
+    `damaged`: files whose content does not match its hash any more
     """
 
     files: int

@@ -28,10 +28,7 @@ _STAGING = ".backup-"
 def backup(data: Path, target: Path) -> Account:
     """Write a backup of a data folder, which a service may be using.
 
-    Raises
-    ------
-    InputError
-        There is no store, the target exists, or the disk fails.
+    Raises `InputError`: there is no store, the target exists, or the disk fails.
     """
     if not (data / STORE).is_file():
         raise InputError("RCSA_IDENT_DATA", f"no {STORE}", "the data folder of a service")

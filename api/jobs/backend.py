@@ -19,15 +19,9 @@ Carry = Callable[[str, Remember], None]
 class Carried:
     """State of a job in the engine.
 
-    Parameters
-    ----------
-    job : str
-    state : str
-        waiting, running or over.
-    executor : str or None
-        Name of the worker that runs it.
-    current : bool
-        Whether workers of this release can run it.
+    `state`: waiting, running or over
+    `executor`: name of the worker that runs it
+    `current`: whether workers of this release can run it
     """
 
     job: str

@@ -34,13 +34,7 @@ class Json(_Serializer):
 
 
 class Durable:
-    """DBOS in this process, which can have one only.
-
-    Parameters
-    ----------
-    url : str
-        Of the engine's tables.
-    """
+    """DBOS in this process, which can have one only. `url`: of the engine's tables."""
 
     def __init__(self, url: str) -> None:
         self.url = url

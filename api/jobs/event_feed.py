@@ -21,14 +21,7 @@ class Crowded(Exception):
 
 
 class EventFeeds:
-    """Feeds of the events of jobs.
-
-    Parameters
-    ----------
-    jobs : Jobs
-    places : Shares
-        Simultaneous streams.
-    """
+    """Feeds of the events of jobs. `places`: simultaneous streams."""
 
     def __init__(self, jobs: Jobs, places: Shares) -> None:
         self.jobs, self.places = jobs, places

@@ -54,19 +54,10 @@ CHUNK, POINTS = 4, 300
 def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outcome:
     """Identify a machine.
 
-    Parameters
-    ----------
-    load : callable
-    job : Job
-        With campaign, seed, method and apply in its request; the identification that it goes on from is its text ``start``, a robot's
-        data sheet its text ``robot``.
-    spread : callable
-        A map that the searches may go through, in place of the builtin.
-
-    Raises
-    ------
-    InputError
-        The campaign is gone or has changed, or none of its cuts is usable and there is no hammer test.
+    `job`: with campaign, seed, method and apply in its request; the identification that it goes on from is its text ``start``, a robot's
+        data sheet its text ``robot``
+    `spread`: a map that the searches may go through, in place of the builtin
+    Raises `InputError`: the campaign is gone or has changed, or none of its cuts is usable and there is no hammer test.
     """
     request = json.loads(whole(job.request, job.request_digest, f"request of the job {job.id}", "ask for the job once more"))
     start, robot = (context.jobs.text(job.id, name) for name in ("start", "robot"))

@@ -48,16 +48,9 @@ class Faulty(Exception):
 class JobContext:
     """Context of a running job, whose events a thread of its own delivers to the store.
 
-    Parameters
-    ----------
-    jobs : Jobs
-    job, token : str
-        Of the job, and of the worker.
-    remember : Remember
-    leave : callable
-        Ends the process with an exit code; the job continues from its last step elsewhere or after a restart.
-    resumed : bool
-        The job had come past its first step before: if that is not remembered, it says so.
+    `job`, `token`: of the job, and of the worker
+    `leave`: ends the process with an exit code; the job continues from its last step elsewhere or after a restart
+    `resumed`: the job had come past its first step before: if that is not remembered, it says so
     """
 
     def __init__(
@@ -97,14 +90,9 @@ class JobContext:
     def remember(self, name: str, compute: Callable[[], Any]) -> Any:
         """Return the result of a step, which is computed once whatever process dies.
 
-        Raises
-        ------
-        InputError
-            As the step has raised it.
-        Faulty
-            The step has raised something else.
-        Outdated
-            It is remembered, but by another version of the service, or in a form that cannot be read.
+        Raises `InputError` as the step has raised it.
+        Raises `Faulty`: the step has raised something else.
+        Raises `Outdated`: it is remembered, but by another version of the service, or in a form that cannot be read.
         """
         self.check()
         computed: dict[str, Any] | None = None
@@ -157,14 +145,9 @@ class JobContext:
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any], name: str, stage: str, spread: Map = map) -> list[Any]:
         """Return the results of all tasks in order, each a step of its own.
 
-        Parameters
-        ----------
-        name : str
-            Of this call: unique in the job, and the same in every run.
-        stage : str
-            Reported as progress meanwhile.
-        spread : callable
-            The builtin `map` or that of a pool; tasks without a stored result go through it together.
+        `name`: of this call: unique in the job, and the same in every run
+        `stage`: reported as progress meanwhile
+        `spread`: the builtin `map` or that of a pool; tasks without a stored result go through it together
         """
         running: Any = None
         found = []

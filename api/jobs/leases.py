@@ -19,11 +19,7 @@ class Leases:
 
     Clocks jump, and differ between machines: what counts is for how long nobody has changed the time at which a job was watched last.
 
-    Parameters
-    ----------
-    jobs : Jobs
-    seconds : float [s]
-        For which a job goes on that nobody watches.
+    `seconds` [s]: for which a job goes on that nobody watches
     """
 
     def __init__(self, jobs: Jobs, seconds: float) -> None:
@@ -33,10 +29,7 @@ class Leases:
     def sweep(self, now: float | None = None) -> list[str]:
         """Cancel the jobs that have not been watched for so long, as far as this was seen, and return their ids.
 
-        Parameters
-        ----------
-        now : float, optional [s]
-            Of the monotonic clock.
+        `now` [s]: of the monotonic clock
         """
         now = time.monotonic() if now is None else now
         found = self.jobs.watched()

@@ -29,13 +29,7 @@ def asked(machine: MachineText, toolings: Sequence[ToolingSource], question: Lob
 class _Known:
     """The limits of one of several toolings that are known, told whenever there is another.
 
-    Parameters
-    ----------
-    context : JobContext
-    speeds : sequence of float [rad/s]
-        That were asked for; a recommendation needs some beside them, too.
-    tooling : str
-    index, toolings : int
+    `speeds`: sequence of float [rad/s], that were asked for; a recommendation needs some beside them, too
     """
 
     def __init__(self, context: JobContext, speeds: Sequence[float], tooling: str, index: int, toolings: int) -> None:
@@ -68,10 +62,7 @@ class _Known:
 def carry(job: Job, context: JobContext) -> Outcome:
     """Compute the lobes of all toolings, whose questions are the job's text ``question``.
 
-    Raises
-    ------
-    InputError
-        Another version of the service has accepted the question, and this one cannot read it.
+    Raises `InputError`: another version of the service has accepted the question, and this one cannot read it.
     """
     try:
         machine, toolings, question = decode(str(context.jobs.text(job.id, "question")))

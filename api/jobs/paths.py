@@ -31,17 +31,8 @@ def asked(machine: MachineText | None, called: str, tooling: ToolingSource, requ
 def carry(job: Job, context: JobContext, most: float) -> Outcome:
     """Cut along the path of a job's text ``question``.
 
-    Parameters
-    ----------
-    job : Job
-    context : JobContext
-    most : float [s]
-        Of work; how many unlike cuts a path has is known only when it is cut.
-
-    Raises
-    ------
-    InputError
-        Another version of the service has accepted the question, and this one cannot read it; or it is too much work.
+    `most` [s]: of work; how many unlike cuts a path has is known only when it is cut
+    Raises `InputError`: another version of the service has accepted the question, and this one cannot read it; or it is too much work.
     """
     try:
         machine, called, tooling, request = decode(str(context.jobs.text(job.id, "question")))

@@ -22,14 +22,9 @@ Work = Callable[[Any, Callable[[], None], threading.Event], None]
 class Supervisor:
     """Supervisor of worker processes.
 
-    Parameters
-    ----------
-    works : sequence of callable of (settings, ready, stop)
-        What each worker does; importable by name.
-    settings : object
-        Picklable.
-    nice : int
-        Increment of their niceness.
+    `works`: sequence of callable of (settings, ready, stop); what each worker does; importable by name
+    `settings`: picklable
+    `nice`: increment of their niceness
     """
 
     def __init__(self, works: Sequence[Work], settings: Any, nice: int = 0) -> None:

@@ -43,10 +43,7 @@ def carry(
 ) -> None:
     """Carry out a job and store its outcome; in any case either the job ends or the process does.
 
-    Parameters
-    ----------
-    attempts : int
-        Times that a job may be started without completing another step.
+    `attempts`: times that a job may be started without completing another step
     """
     with telling(job=id):
         try:
@@ -101,16 +98,7 @@ def _given_up(attempts: int) -> Outcome:
 
 
 class JobWorker:
-    """The job worker of this process.
-
-    Parameters
-    ----------
-    jobs : Jobs
-    backend : JobBackend
-    carriers : mapping of kind to Carrier
-        Of the kinds that it carries out.
-    attempts : int
-    """
+    """The job worker of this process. `carriers`: mapping of kind to Carrier, of the kinds that it carries out."""
 
     def __init__(self, jobs: Jobs, backend: JobBackend, carriers: Mapping[str, Carrier], attempts: int) -> None:
         self.jobs, self.backend, self.carriers, self.attempts = jobs, backend, carriers, attempts

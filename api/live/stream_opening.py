@@ -46,17 +46,9 @@ class Source:
 class Opening:
     """Everything that a session begins with.
 
-    Parameters
-    ----------
-    machine, tooling
-    machine_id, name : str
-    question : StreamQuestion
-    settle : int
-        Samples that the observer is designed from; 0 for a replay.
-    air : callable or None
-        Reads an uploaded air cut.
-    source : Source or None
-        Of a replay.
+    `settle`: samples that the observer is designed from; 0 for a replay
+    `air`: reads an uploaded air cut
+    `source`: of a replay
     """
 
     machine: MachineText

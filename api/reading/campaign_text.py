@@ -39,15 +39,7 @@ Library = Callable[[str], str | None]
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A file that a campaign names.
-
-    Parameters
-    ----------
-    role : str
-        cut, air or hammer.
-    cuts : tuple of str
-        Ids of the cuts, or of the hammer tests, that it serves.
-    """
+    """A file that a campaign names. `role`: cut, air or hammer. `cuts`: ids of the cuts, or of the hammer tests, that it serves."""
 
     role: str
     cuts: tuple[str, ...]
@@ -57,14 +49,9 @@ class File:
 class Upload:
     """An uploaded file and its interpretation.
 
-    Parameters
-    ----------
-    path : Path
-        Of the file; its name has no meaning.
-    name : str
-        Given by the client; its suffix is the format.
-    target : Path
-        To write the samples to; does not exist yet.
+    `path`: of the file; its name has no meaning
+    `name`: given by the client; its suffix is the format
+    `target`: to write the samples to; does not exist yet
     """
 
     path: Path
@@ -80,16 +67,8 @@ def recording_name(text: str) -> str:
 def declare(data: Mapping[str, Any], library: Library) -> tuple[str, str, int]:
     """Return name, text and number of cuts of a campaign that has passed the checks of `rcsa-ident check`, recordings aside.
 
-    Parameters
-    ----------
-    data : mapping
-        The keys of campaign.toml; a tooling may also be a name of the library, the text of a tooling file, or a table of its own.
-    library : callable
-
-    Raises
-    ------
-    InputError
-        Names the key, what was found and what is allowed.
+    `data`: the keys of campaign.toml; a tooling may also be a name of the library, the text of a tooling file, or a table of its own
+    Raises `InputError`, which names the key, what was found and what is allowed.
     """
     for key, most in (("sensors", MOST_SENSORS), ("cuts", MOST_CUTS), ("frfs", MOST_TESTS), ("toolings", MOST_TOOLINGS)):
         if isinstance(data.get(key), Mapping | list) and len(data[key]) > most:
@@ -242,10 +221,7 @@ def files_of(text: str) -> dict[str, File]:
 def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
     """Return campaign.toml of a folder with ``toolings/`` and ``recordings/``.
 
-    Parameters
-    ----------
-    there : callable
-        Whether the folder holds a file; cuts and hammer tests without theirs are omitted.
+    `there`: whether the folder holds a file; cuts and hammer tests without theirs are omitted
     """
     data = json.loads(text)
     for cut in (cuts := [cut for cut in data["cuts"] if there(cut["cut"])]):

@@ -24,10 +24,7 @@ ReadTest = Callable[[HammerTest], tuple[FloatArray, ComplexArray]]
 def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> tuple[Campaign, ReadCut, ReadTest]:
     """Return a campaign with the cuts and hammer tests that have files, and picklable functions that read them.
 
-    Raises
-    ------
-    InputError
-        The campaign has been deleted, or none of its cuts and hammer tests has a file.
+    Raises `InputError`: the campaign has been deleted, or none of its cuts and hammer tests has a file.
     """
     row = store.campaigns.get(group, campaign_id)
     if row is None:

@@ -17,17 +17,10 @@ from rcsa_ident.io.toml_text import keys_of_toml
 class DroppedTooling:
     """A tooling among dropped files.
 
-    Parameters
-    ----------
-    file, text : str
-    key : str
-        Its name in the library and in the campaign.
-    listed : bool
-        Whether the campaign names it.
-    there : str or None
-        The text of the library's tooling of that name.
-    differences : list of (str, object, object)
-        Field, the library's value and the dropped one.
+    `key`: its name in the library and in the campaign
+    `listed`: whether the campaign names it
+    `there`: the text of the library's tooling of that name
+    `differences`: list of (str, object, object); field, the library's value and the dropped one
     """
 
     file: str
@@ -42,19 +35,11 @@ class DroppedTooling:
 class Dropped:
     """What dropped files hold.
 
-    Parameters
-    ----------
-    campaign, name : str or None
-        The campaign's file and name.
-    keys : dict
-        Of the campaign.
-    toolings : list of DroppedTooling
-    from_library, missing : list of str
-        Toolings of the campaign that are not among the files: the library's, and those that it lacks.
-    recordings : list of str
-        Names of the recordings and hammer tests' files that the campaign wants.
-    others : list of str
-        Files that are neither campaign nor tooling.
+    `campaign`, `name`: the campaign's file and name
+    `keys`: of the campaign
+    `from_library`, `missing`: toolings of the campaign that are not among the files: the library's, and those that it lacks
+    `recordings`: names of the recordings and hammer tests' files that the campaign wants
+    `others`: files that are neither campaign nor tooling
     """
 
     campaign: str | None = None
@@ -70,15 +55,8 @@ class Dropped:
 def look_at(files: Sequence[tuple[str, str]], library: Library) -> Dropped:
     """Return what TOML files, each a name and a text, hold: by their keys and not by their names.
 
-    Parameters
-    ----------
-    files : sequence of (str, str)
-    library : callable
-
-    Raises
-    ------
-    InputError
-        Names file and key; a campaign whose toolings are all there is checked as it will be when it is made.
+    `files`: sequence of (str, str)
+    Raises `InputError`, which names file and key; a campaign whose toolings are all there is checked as it will be when it is made.
     """
 
     def known(name: str) -> str | None:

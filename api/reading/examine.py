@@ -34,10 +34,7 @@ def _declared(text: str) -> Campaign:
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
     """Return the samples of an upload in SI and write them normalised; errors carry the client's file name.
 
-    Parameters
-    ----------
-    rate : float or None [Hz]
-        Of a file without a rate.
+    `rate` [Hz]: of a file without a rate
     """
     try:
         found, signals = read_signals(upload.path, [sensor.name for sensor in sensors], rate, Path(upload.name).suffix)
@@ -58,14 +55,9 @@ def with_client_name(error: InputError, path: Path, name: str) -> InputError:
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
     """Read an upload of a campaign and return its description with the verdict.
 
-    Parameters
-    ----------
-    text : str
-        The campaign as declared.
-    cut_id, role : str
-        The cut it belongs to; one of them for an air cut.
-    air : Path or None
-        Samples of the cut's air cut, where they have been uploaded.
+    `text`: the campaign as declared
+    `cut_id`, `role`: the cut it belongs to; one of them for an air cut
+    `air`: samples of the cut's air cut, where they have been uploaded
     """
     campaign = _declared(text)
     cut = next(each for each in campaign.cuts if each.id == cut_id)

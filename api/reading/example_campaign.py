@@ -40,14 +40,7 @@ def example_tooling(name: str) -> str:
 
 
 class Examples:
-    """Example campaigns in the making.
-
-    Parameters
-    ----------
-    uploads : Uploads
-    work : Work
-        Where the virtual machine cuts.
-    """
+    """Example campaigns in the making. `work`: where the virtual machine cuts."""
 
     def __init__(self, uploads: Uploads, work: Work) -> None:
         self.uploads, self.work = uploads, work

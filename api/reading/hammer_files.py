@@ -27,16 +27,8 @@ _ID, _FREQUENCY, _REAL, _IMAGINARY, _ASSUMED = "id", "frequency_hz", "real", "im
 def look(upload: Upload, text: str) -> dict[str, Any]:
     """Read the FRFs of an upload that a campaign's hammer tests name, write them normalised, and return what they are.
 
-    Parameters
-    ----------
-    upload : Upload
-    text : str
-        The campaign as declared.
-
-    Raises
-    ------
-    InputError
-        A test that names the file cannot be read from it, or has too few lines in its band.
+    `text`: the campaign as declared
+    Raises `InputError`: a test that names the file cannot be read from it, or has too few lines in its band.
     """
     campaign = campaign_of_text(text)
     tests = tuple(replace(test, file=upload.path) for test in campaign.tests if test.file == Path(upload.name))

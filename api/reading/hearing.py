@@ -39,12 +39,8 @@ _HIGHEST_RING, _RING_SECONDS, _RING_BAND = 20e3, 0.25, (250.0, 25e3)
 def listen(path: Path, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a recording says, as `rcsa-ident listen --json` does.
 
-    Parameters
-    ----------
-    name : str
-        Given by the client; its suffix is the format.
-    asked : mapping
-        The query's parameters by name: channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, sensitivity, curves.
+    `name`: given by the client; its suffix is the format
+    `asked`: the query's parameters by name: channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, sensitivity, curves
     """
     opened = _opened(path, name, asked["channel"], asked["rate_hz"])
     try:
@@ -62,13 +58,9 @@ def listen(path: Path, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
 def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:
     """Return the receptance that recordings of hits give, and what became of each hit; where `file` is asked, written to the target.
 
-    Parameters
-    ----------
-    asked : mapping
-        The query's parameters by name: axis, force, response, quantity, estimator, sensor_mass_g, rate_hz,
-        force_sensitivity, response_sensitivity, reverse; and file, a suffix.
-    *hits : Upload
-        All with one target.
+    `asked`: the query's parameters by name: axis, force, response, quantity, estimator, sensor_mass_g, rate_hz, force_sensitivity,
+        response_sensitivity, reverse; and file, a suffix
+    `*hits`: all with one target
     """
     wanted = [name for name in (asked["force"], asked["response"]) if name is not None]
     opened = [_opened(hit.path, hit.name, wanted, asked["rate_hz"]) for hit in hits]
@@ -90,13 +82,8 @@ def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:
 def ring(tooling: ToolingSource, asked: Mapping[str, Any], *paths: Path) -> dict[str, Any]:
     """Return what the ring of a tooling tells of it, as `rcsa-ident ring --json` does, and the tooling that it teaches.
 
-    Parameters
-    ----------
-    tooling : ToolingSource
-    asked : mapping
-        mass_g, rate_hz and curves of the query; names of the files in `sounds` and `bare_tool`.
-    *paths : Path
-        Their files, in this order.
+    `asked`: mass_g, rate_hz and curves of the query; names of the files in `sounds` and `bare_tool`
+    `*paths`: their files, in this order
     """
     drawn = tooling_from(tooling)
     weigh(drawn.assembly, _HIGHEST_RING)

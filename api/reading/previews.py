@@ -45,10 +45,7 @@ def envelope(path: Path, points: int) -> dict[str, Any]:
 def spectrum(path: Path, speed_rpm: float | None, points: int) -> dict[str, Any]:
     """Return the amplitude spectrum of each channel (Hann window), the maximum of each of at most `points` bands; lost samples are zero.
 
-    Parameters
-    ----------
-    speed_rpm : float or None
-        Spindle speed, whose multiples are returned as harmonics.
+    `speed_rpm`: spindle speed, whose multiples are returned as harmonics
     """
     rate, count = length(path)
     start = max(0, (count - _LONGEST) // 2)

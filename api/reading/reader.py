@@ -43,16 +43,10 @@ _LEAST = 16 << 20
 class Limits:
     """Limits of one call.
 
-    Parameters
-    ----------
-    memory : int [MiB]
-        Address space beyond that of the idle process.
-    seconds : float [s]
-        CPU time.
-    wall_seconds : float [s]
-        Wall-clock time.
-    calls : int
-        After which the process is replaced.
+    `memory` [MiB]: address space beyond that of the idle process
+    `seconds` [s]: CPU time
+    `wall_seconds` [s]: wall-clock time
+    `calls`: after which the process is replaced
     """
 
     memory: int = 2048
@@ -70,17 +64,10 @@ class Limits:
 class Reader:
     """A spawned process that answers one call at a time.
 
-    Parameters
-    ----------
-    limits : Limits
-    queue : int
-        Calls that may wait beyond the running one.
-    prepare : callable
-        Called first in the process, without limits.
-    folder : Path, optional
-        On the disk of the uploads, for the files of a call; nothing else is in it.
-    free_bytes : int
-        That uploads leave free there.
+    `queue`: calls that may wait beyond the running one
+    `prepare`: called first in the process, without limits
+    `folder`: on the disk of the uploads, for the files of a call; nothing else is in it
+    `free_bytes`: that uploads leave free there
     """
 
     def __init__(

@@ -16,10 +16,7 @@ from api.reading.campaign_text import Upload
 class Room:
     """A folder for one process, with what was given to it, to be read, and what it makes.
 
-    Parameters
-    ----------
-    folder : Path, optional
-        Where it is made; beside the files that are linked into it, else these are copied.
+    `folder`: where it is made; beside the files that are linked into it, else these are copied
 
     Attributes
     ----------

@@ -36,10 +36,7 @@ _OF_A_CHUNK, _OF_A_DATASET, _OF_A_FILE = 64, 8192, 1 << 17
 def write_normalised(path: Path, rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> None:
     """Write the signals of sensors, shape (n,) each, block by block, and sync them to the disk.
 
-    Raises
-    ------
-    OSError
-        The disk is full: known before the first sample is written, since HDF5 may end the process where a write fails.
+    Raises `OSError`: the disk is full: known before the first sample is written, since HDF5 may end the process where a write fails.
     """
     kinds = [np.dtype(np.float32 if all(_single(block) for _, block in _blocks_of(signal)) else np.float64) for signal in signals]
     chunks = [int(min(max(rate, 1.0), LARGEST_CHUNK // 8, signal.size)) for signal in signals]
@@ -91,16 +88,8 @@ def _single(signal: FloatArray) -> bool:
 def read_normalised(path: str | Path, in_file: bool = False) -> Recording:
     """Return the samples of an upload in SI.
 
-    Parameters
-    ----------
-    path : path
-    in_file : bool
-        Leave those of a long recording in the file.
-
-    Raises
-    ------
-    InputError
-        The file is missing or damaged.
+    `in_file`: leave those of a long recording in the file
+    Raises `InputError`: the file is missing or damaged.
     """
     sensors, notes = _about(Path(path))
     rate, signals = read_signals(path, [f"{i}" for i in range(len(sensors))], suffix=".h5")

@@ -59,10 +59,7 @@ def _whole(files: Files, recording: Recording, kind: str, key: str, sha256: str)
 class Samples:
     """The samples of recordings, by the paths of their files, for a process that has no store.
 
-    Parameters
-    ----------
-    sha256 : mapping of path to str
-        Hexadecimal; empty where it is not known.
+    `sha256`: hexadecimal; empty where it is not known
     """
 
     sha256: dict[Path, str]

@@ -42,16 +42,7 @@ class Received:
 
 
 class Uploads:
-    """Storage of recordings.
-
-    Parameters
-    ----------
-    store : Store
-    files : Files
-    reader : Work
-    places : Shares
-        Simultaneous uploads.
-    """
+    """Storage of recordings. `places`: simultaneous uploads."""
 
     def __init__(self, store: Store, files: Files, reader: Work, places: Shares) -> None:
         self.store, self.files, self.reader, self.places = store, files, reader, places
@@ -86,14 +77,9 @@ class Uploads:
     async def take(self, campaign: Campaign, name: str, received: Received, replacing: bool = False) -> tuple[int, Recording]:
         """Store a file as a recording of the campaign; return 201, or 200 where it existed already, and the recording.
 
-        Raises
-        ------
-        Taken
-            A recording with other content exists.
-        InputError
-            The file cannot be read; nothing is stored.
-        KeyError
-            The campaign does not exist any more.
+        Raises `Taken`: a recording with other content exists.
+        Raises `InputError`: the file cannot be read; nothing is stored.
+        Raises `KeyError`: the campaign does not exist any more.
         """
         file = files_of(campaign.text)[name]
         there = await asyncio.to_thread(self.store.recordings.get, campaign.group, campaign.id, name)
@@ -112,13 +98,7 @@ class Uploads:
         return status, again or kept
 
     async def finish(self, path: Path, state: Partial) -> None:
-        """Store a resumable upload that is complete; its bytes stay unless they are at fault.
-
-        Raises
-        ------
-        Taken, InputError
-            As `take`.
-        """
+        """Store a resumable upload that is complete; its bytes stay unless they are at fault. Raises `Taken`, `InputError` as `take`."""
         with self.alone(state.campaign, state.name):
             try:
                 campaign = await asyncio.to_thread(self.store.campaigns.get, state.group, state.campaign)

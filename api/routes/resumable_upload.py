@@ -107,14 +107,9 @@ async def patch(
 class Checksum(NamedTuple):
     """What a part is to hash to.
 
-    Parameters
-    ----------
-    algorithm : str
-        As `hashlib` calls it.
-    digest : str
-        In hexadecimal digits.
-    check : callable of (announced, found)
-        Raises where they differ.
+    `algorithm`: as `hashlib` calls it
+    `digest`: in hexadecimal digits
+    `check`: callable of (announced, found); raises where they differ
     """
 
     algorithm: str
@@ -125,15 +120,10 @@ class Checksum(NamedTuple):
 class Upload(NamedTuple):
     """What a part says of its upload.
 
-    Parameters
-    ----------
-    offset : int [bytes]
-    length : int or None [bytes]
-        Of the whole; None where it is known.
-    replace : bool
-        Whether the whole takes the place of other content.
-    whole : str or None
-        SHA-256 of the whole.
+    `offset` [bytes]
+    `length` [bytes]: of the whole; None where it is known
+    `replace`: whether the whole takes the place of other content
+    `whole`: SHA-256 of the whole
     """
 
     offset: int

@@ -40,15 +40,7 @@ _MONTHS = "public, max-age=31536000, immutable"
 
 @dataclass(frozen=True, slots=True)
 class _File:
-    """A file to send.
-
-    Parameters
-    ----------
-    kind : str
-    plain, packed : bytes
-        Content without and with gzip.
-    digest : str
-    """
+    """A file to send. `plain`, `packed`: content without and with gzip."""
 
     kind: str
     plain: bytes

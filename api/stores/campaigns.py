@@ -11,15 +11,9 @@ from typing import Protocol
 class Campaign:
     """A declared campaign of a machine.
 
-    Parameters
-    ----------
-    id, group, machine, name : str
-    text : str
-        The keys of campaign.toml as JSON: toolings by their texts, recordings by the last part of their paths.
-    cuts : int
-        Number of declared cuts.
-    created : str
-        UTC, ISO 8601.
+    `text`: the keys of campaign.toml as JSON: toolings by their texts, recordings by the last part of their paths
+    `cuts`: number of declared cuts
+    `created`: UTC, ISO 8601
     """
 
     id: str
@@ -35,26 +29,15 @@ class Campaign:
 class Recording:
     """An uploaded file and what was found in it.
 
-    Parameters
-    ----------
-    group, campaign, name : str
-        `name` is that of the campaign's declaration.
-    role : str
-        cut, air or hammer.
-    size : int [bytes]
-    sha256 : str
-        Of the untouched upload, hexadecimal.
-    normalised : str
-        Names the samples that were read from it.
-    found : str
-        JSON: rate, duration, channels, speed, harmonics, verdict; of hammer tests their lines.
-    judged_with : str
-        `normalised` of the air cut that the verdict on a cut rests on, empty without one.
-    created : str
-    samples : str
-        SHA-256 of the samples' file, hexadecimal; empty where a release has stored them that did not keep it.
-    digest : str
-        Of `found`, as it was stored.
+    `group`, `campaign`, `name`: `name` is that of the campaign's declaration
+    `role`: cut, air or hammer
+    `size` [bytes]
+    `sha256`: of the untouched upload, hexadecimal
+    `normalised`: names the samples that were read from it
+    `found`: JSON: rate, duration, channels, speed, harmonics, verdict; of hammer tests their lines
+    `judged_with`: `normalised` of the air cut that the verdict on a cut rests on, empty without one
+    `samples`: SHA-256 of the samples' file, hexadecimal; empty where a release has stored them that did not keep it
+    `digest`: of `found`, as it was stored
     """
 
     group: str

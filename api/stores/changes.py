@@ -17,15 +17,9 @@ ACTIONS = (MADE, CHANGED, RESTORED, DELETED)
 class Note:
     """What a writer leaves with a change.
 
-    Parameters
-    ----------
-    key : str
-        Id of the API key.
-    who : str
-        Its name.
-    why : str
-    restores : int
-        The version that is written again; 0 where the content is new.
+    `key`: id of the API key
+    `who`: its name
+    `restores`: the version that is written again; 0 where the content is new
     """
 
     key: str = ""
@@ -42,25 +36,14 @@ UNSIGNED = Note()
 class Change:
     """An entry of the trail.
 
-    Parameters
-    ----------
-    id : int
-        Increases over all entries.
-    kind, name : str
-        One of `KINDS`; name of the tooling or the robot, or id of the machine.
-    title : str
-        As people call it, then: a machine's name stays readable when it is gone.
-    version : int
-        Counts the changes of one thing from 1.
-    action : str
-        One of `ACTIONS`.
-    restores : int
-    created : str
-        UTC, ISO 8601.
-    text, summary, digest, summary_digest : str
-        Of the version, as in `Document`; empty where there is none.
-    holds : bool
-        Whether this content is what is there now.
+    `id`: increases over all entries
+    `kind`, `name`: one of `KINDS`; name of the tooling or the robot, or id of the machine
+    `title`: as people call it, then: a machine's name stays readable when it is gone
+    `version`: counts the changes of one thing from 1
+    `action`: one of `ACTIONS`
+    `created`: UTC, ISO 8601
+    `text`, `summary`, `digest`, `summary_digest`: of the version, as in `Document`; empty where there is none
+    `holds`: whether this content is what is there now
     """
 
     id: int

@@ -56,12 +56,8 @@ def open_engine(url: str) -> Engine:
 def version_in(file: Path) -> str:
     """Return the schema version of an embedded database, which is left as it is; empty where it holds no store.
 
-    Raises
-    ------
-    InputError
-        A later release has written it.
-    ValueError
-        It holds something else.
+    Raises `InputError`: a later release has written it.
+    Raises `ValueError`: it holds something else.
     """
     engine = create_engine(URL.create("sqlite", database=str(file)))
     try:
@@ -81,14 +77,7 @@ def _destroyed(error: Exception) -> bool:
 
 
 class Database:
-    """Transactions on one database.
-
-    Parameters
-    ----------
-    engine : Engine
-    group_bytes : int
-        That the rows of a group may take.
-    """
+    """Transactions on one database. `group_bytes`: that the rows of a group may take."""
 
     def __init__(self, engine: Engine, group_bytes: int = 1 << 62) -> None:
         self.engine, self.group_bytes, self.destroyed = engine, group_bytes, False

@@ -52,17 +52,9 @@ class Damaged(Exception):
 class Key:
     """An API key; only the hash of its secret is stored.
 
-    Parameters
-    ----------
-    id, group, label : str
-    scopes : tuple of str
-    secret_hash : str
-    created : str
-        UTC, ISO 8601.
-    expires : str or None
-        From when on it opens nothing.
-    used : str or None
-        When it was last used, to the minute.
+    `created`: UTC, ISO 8601
+    `expires`: from when on it opens nothing
+    `used`: when it was last used, to the minute
     """
 
     id: str
@@ -90,18 +82,10 @@ class Machine:
 class Document:
     """A named text: a tooling, a robot, or the identification of a machine.
 
-    Parameters
-    ----------
-    name : str
-        Of the tooling or the robot, or id of the machine.
-    text : str
-    summary : str
-        Content of list entries, JSON.
-    digest : str
-        Of the text: its entity tag.
-    changed : str
-    summary_digest : str
-        As it was stored; of a new document that of its summary.
+    `name`: of the tooling or the robot, or id of the machine
+    `summary`: content of list entries, JSON
+    `digest`: of the text: its entity tag
+    `summary_digest`: as it was stored; of a new document that of its summary
     """
 
     group: str
@@ -124,15 +108,8 @@ def digest_of(text: str) -> str:
 def whole(text: str, digest: str, what: str, mend: str) -> str:
     """Return a text that has its digest.
 
-    Parameters
-    ----------
-    what, mend : str
-        What the text is, and what makes it whole again, for people.
-
-    Raises
-    ------
-    Damaged
-        It has another one.
+    `what`, `mend`: what the text is, and what makes it whole again, for people
+    Raises `Damaged`: it has another one.
     """
     if digest_of(text) != digest:
         raise Damaged(f"the stored {what} is damaged: its content is not what was stored; {mend}")

@@ -16,15 +16,8 @@ REMEMBERED = timedelta(days=1)
 def earlier(connection: Connection, table: Table, group: str, repeat: tuple[str, str]) -> Any | None:
     """Return the row of the first call with this key, or None.
 
-    Parameters
-    ----------
-    repeat : (str, str)
-        Key, and digest of the call.
-
-    Raises
-    ------
-    Taken
-        The first call had other content.
+    `repeat`: (str, str); key, and digest of the call
+    Raises `Taken`: the first call had other content.
     """
     row = connection.execute(select(table).where(table.c.group == group, table.c.key == repeat[0])).first()
     if row is not None and row.digest != repeat[1]:

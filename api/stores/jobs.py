@@ -20,39 +20,20 @@ class Full(Exception):
 class Job:
     """An accepted job.
 
-    Parameters
-    ----------
-    id, group, kind : str
-    machine : str
-        Id of the one that it belongs to, and is deleted with; empty where it asks of a robot.
-    campaign : str or None
-    request : str
-        Body of the request, JSON.
-    state : str
-        One of `STATES`.
-    created : str
-        UTC, ISO 8601.
-    progress : str or None
-        Stage, done and total, JSON.
-    status : str or None
-        Of an identification that is done: converged, not validated, suspect or failed.
-    problem : str or None
-        Reason of a failure, JSON.
-    started, finished : str or None
-    seconds : float [s]
-        That it took, waiting left out.
-    attempts : int
-        Times that it was taken up since it last came further.
-    worker : str or None
-        Token of the process that carries it out.
-    events : int
-        Number of its last event.
-    key, who : str
-        Of the API key that asked for it: id and name.
-    watched : str or None
-        When somebody followed it last; None where it goes on without.
-    request_digest : str
-        Of the request, as it was stored.
+    `machine`: id of the one that it belongs to, and is deleted with; empty where it asks of a robot
+    `request`: body of the request, JSON
+    `state`: one of `STATES`
+    `created`: UTC, ISO 8601
+    `progress`: stage, done and total, JSON
+    `status`: of an identification that is done: converged, not validated, suspect or failed
+    `problem`: reason of a failure, JSON
+    `seconds` [s]: that it took, waiting left out
+    `attempts`: times that it was taken up since it last came further
+    `worker`: token of the process that carries it out
+    `events`: number of its last event
+    `key`, `who`: of the API key that asked for it: id and name
+    `watched`: when somebody followed it last; None where it goes on without
+    `request_digest`: of the request, as it was stored
     """
 
     id: str
@@ -82,16 +63,10 @@ class Job:
 class Event:
     """An event of a job.
 
-    Parameters
-    ----------
-    number : int
-        Increases within the job, with gaps.
-    kind : str
-        progress, trace, fit, partial, note or end.
-    data : str
-        JSON; empty for progress and end, whose content is the job itself.
-    topic : str
-        A later event replaces an earlier one of the same topic; empty where all are stored.
+    `number`: increases within the job, with gaps
+    `kind`: progress, trace, fit, partial, note or end
+    `data`: JSON; empty for progress and end, whose content is the job itself
+    `topic`: a later event replaces an earlier one of the same topic; empty where all are stored
     """
 
     number: int
@@ -113,16 +88,9 @@ class Applied:
 class Outcome:
     """Outcome of a job.
 
-    Parameters
-    ----------
-    state : str
-        done or failed.
-    finished : str
-    seconds : float [s]
-    status, problem : str or None
-    texts : mapping of name to text
-        Results.
-    applied : Applied or None
+    `state`: done or failed
+    `seconds` [s]
+    `texts`: mapping of name to text, results
     """
 
     state: str
@@ -138,18 +106,11 @@ class Outcome:
 class Worker:
     """A process that carries out jobs.
 
-    Parameters
-    ----------
-    id : str
-        Its name as executor of the durable engine; the successor of a dead worker takes the same name.
-    place : str
-        Id of the machine since its boot; processes of one place see each other.
-    process : str
-        Identity of the process at its place.
-    token : str
-        Unique to this worker.
-    beats : int
-        Heartbeats; increases while the worker lives.
+    `id`: its name as executor of the durable engine; the successor of a dead worker takes the same name
+    `place`: id of the machine since its boot; processes of one place see each other
+    `process`: identity of the process at its place
+    `token`: unique to this worker
+    `beats`: heartbeats; increases while the worker lives
     """
 
     id: str

@@ -12,20 +12,12 @@ class Counts:
     At any time, of all indices from the first to the one before `following`:
     following - origin = samples + dropped + lost + backlog.
 
-    Parameters
-    ----------
-    origin, following : int
-        Index of the first sample, and the next one expected; -1 before the first frame.
-    samples : int
-        Whose forces have been computed.
-    lost : int
-        That never arrived.
-    late : int
-        That arrived twice or after later ones; discarded, and not part of the sum.
-    dropped : int
-        That arrived and were discarded because the service lagged behind.
-    backlog : int
-        That are waiting.
+    `origin`, `following`: index of the first sample, and the next one expected; -1 before the first frame
+    `samples`: whose forces have been computed
+    `lost`: that never arrived
+    `late`: that arrived twice or after later ones; discarded, and not part of the sum
+    `dropped`: that arrived and were discarded because the service lagged behind
+    `backlog`: that are waiting
     """
 
     origin: int = -1

@@ -23,18 +23,11 @@ from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 class StreamQuestion:
     """Properties of a stream.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    speed : float or None [rad/s]
-        None: from the trigger.
-    sensors : tuple of Sensor
-        Of the channels, in their order.
-    axes : tuple of str
-        In the order of the columns of the forces.
-    begins : str
-        air: the spindle first turns in air, which shows its run-out; cut: the stream begins in the cut.
-    method : str
+    `rate` [Hz]
+    `speed` [rad/s]: None: from the trigger
+    `sensors`: of the channels, in their order
+    `axes`: in the order of the columns of the forces
+    `begins`: air: the spindle first turns in air, which shows its run-out; cut: the stream begins in the cut
     """
 
     rate: float
@@ -50,14 +43,9 @@ def design(
 ) -> tuple[str, dict[str, Any]]:
     """Return the encoded plan of a stream for the stream process, and the content of the client's event `ready`.
 
-    Parameters
-    ----------
-    first : int
-        Index of the first sample.
-    raw : bytes
-        float64[samples, channels], as received.
-    air : callable or None
-        Reads an uploaded air cut.
+    `first`: index of the first sample
+    `raw`: float64[samples, channels], as received
+    `air`: reads an uploaded air cut
     """
     samples = np.frombuffer(raw, "<f8").reshape(-1, len(question.sensors))
     recording = Recording(question.rate, samples / np.array([s.sensitivity for s in question.sensors]), question.sensors)
@@ -68,12 +56,8 @@ def design(
 def design_replay(machine: MachineText, tooling: ToolingSource, question: StreamQuestion, source: ReadPair) -> tuple[str, dict[str, Any]]:
     """Return the same for a recording, whose streamed forces equal those of the whole recording to the last digit.
 
-    Parameters
-    ----------
-    question : StreamQuestion
-        The sensors are those of the recording, the samples in SI.
-    source : callable
-        Reads the recording and its air cut.
+    `question`: the sensors are those of the recording, the samples in SI
+    `source`: reads the recording and its air cut
     """
     recording, air = source()
     return _planned(machine, tooling, question, 0, recording, air, follow=False)

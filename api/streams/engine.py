@@ -31,19 +31,11 @@ class Endless(Exception):
 class Message:
     """A message between the service and the stream process.
 
-    Parameters
-    ----------
-    kind : int
-        OPEN: content is a `Plan`, encoded by one of the service's own workers. BLOCK: content is float64[samples, channels], `first`
-        its index. FORCES: content is float64[samples, axes] of the block from `first` on, without those in which the observer
-        settles, `drift` of the spindle's speed as a share, `known` 1 where the spindle's angle was. REFUSED: forces are not
-        finite. FAILED: content is what is logged.
-    session : int
-    first : int
-    arrived : float [s]
-        By the machine's monotonic clock; returned with the forces.
-    drift, known : float
-    content : bytes
+    `kind`: OPEN: content is a `Plan`, encoded by one of the service's own workers. BLOCK: content is float64[samples, channels], `first`
+        its index. FORCES: content is float64[samples, axes] of the block from `first` on, without those in which the observer settles,
+        `drift` of the spindle's speed as a share, `known` 1 where the spindle's angle was. REFUSED: forces are not finite. FAILED: content
+        is what is logged.
+    `arrived` [s]: by the machine's monotonic clock; returned with the forces
     """
 
     kind: int
@@ -72,20 +64,11 @@ class Column:
 class Plan:
     """Plan of a session: its observer and the layout of its frames.
 
-    Parameters
-    ----------
-    observer : LiveObserver
-    gap : tuple of Column
-        For each axis.
-    acceleration : tuple of Column or None
-    channels : int
-        Of a frame.
-    origin : int
-        Index of the sample at which the observer begins.
-    order : tuple of int
-        Indices of the observer's axes, in the order of the answer's columns.
-    settling : int
-        Samples behind each start of the observer whose forces are not told.
+    `gap`: for each axis
+    `channels`: of a frame
+    `origin`: index of the sample at which the observer begins
+    `order`: indices of the observer's axes, in the order of the answer's columns
+    `settling`: samples behind each start of the observer whose forces are not told
     """
 
     observer: LiveObserver

@@ -45,12 +45,8 @@ def unpacked(raw: bytes, buckets: bool = False) -> tuple[int, FloatArray]:
 def samples_of(raw: bytes, channels: int) -> tuple[int, FloatArray]:
     """Return first index and samples, float32, shape (n, channels), of a frame that a client has sent.
 
-    Raises
-    ------
-    InputError
-        If header and length do not agree, with each other or the session, or a sample is not finite.
-    TooLarge
-        Of more than 65 536 samples.
+    Raises `InputError` if header and length do not agree, with each other or the session, or a sample is not finite.
+    Raises `TooLarge` of more than 65 536 samples.
     """
     if len(raw) < HEADER.size:
         raise InputError("frame", f"{len(raw)} bytes", f"a header of {HEADER.size} bytes and samples")

@@ -36,16 +36,10 @@ _UNEXPECTED = "an internal error occurred; it is logged under this session's id"
 class StreamLimits:
     """Limits of streams.
 
-    Parameters
-    ----------
-    sessions, sessions_per_group, listeners : int
-        Most sessions of the service and of a group, most listeners of a session.
-    several : bool
-        Whether the sessions are shared by groups.
-    idle : float [s]
-        Time without a new sample after which a session ends.
-    drift : float
-        Relative deviation of the spindle speed beyond which a note warns of less accurate forces.
+    `sessions`, `sessions_per_group`, `listeners`: most sessions of the service and of a group, most listeners of a session
+    `several`: whether the sessions are shared by groups
+    `idle` [s]: time without a new sample after which a session ends
+    `drift`: relative deviation of the spindle speed beyond which a note warns of less accurate forces
     """
 
     sessions: int = 16
@@ -61,14 +55,7 @@ class Full(Exception):
 
 
 class Hub:
-    """Registry of sessions, between their connections and the stream process.
-
-    Parameters
-    ----------
-    host : Host
-    limits : StreamLimits
-    metrics : Metrics
-    """
+    """Registry of sessions, between their connections and the stream process."""
 
     def __init__(self, host: Host, limits: StreamLimits, metrics: Metrics) -> None:
         self.host, self.limits, self.metrics = host, limits, metrics

@@ -19,13 +19,8 @@ WAITING_BYTES, WAITING_TEXTS = 4_000_000, 32
 class Listener:
     """Receiver of a session's events and forces.
 
-    Parameters
-    ----------
-    axes : int
-    text : bool
-        JSON in place of bytes.
-    size : int or None
-        Samples per bucket of the envelope; None for every sample.
+    `text`: JSON in place of bytes
+    `size`: samples per bucket of the envelope; None for every sample
     """
 
     def __init__(self, axes: int, text: bool, size: int | None) -> None:
@@ -83,11 +78,7 @@ class Listener:
 class Envelope:
     """Running envelope of a stream. Buckets begin at multiples of their size, whatever the blocks; empty buckets are omitted.
 
-    Parameters
-    ----------
-    size : int
-        Samples per bucket.
-    axes : int
+    `size`: samples per bucket
     """
 
     def __init__(self, size: int, axes: int) -> None:

@@ -38,12 +38,7 @@ class Host(Protocol):
 
 
 class StreamProcess:
-    """A spawned process behind a socket pair, restarted when it dies.
-
-    Parameters
-    ----------
-    kernels : Kernels
-    """
+    """A spawned process behind a socket pair, restarted when it dies."""
 
     def __init__(self, kernels: Kernels = Kernels()) -> None:  # noqa: B008 - never changed
         self.kernels = kernels

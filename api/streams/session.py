@@ -35,14 +35,9 @@ class Stage(StrEnum):
 class End:
     """Why a session is over.
 
-    Parameters
-    ----------
-    code : int
-        Close code of the WebSocket.
-    status : int
-        Status of the problem document; 0 without an error.
-    detail : str
-    errors : tuple of {field, found, allowed}
+    `code`: close code of the WebSocket
+    `status`: status of the problem document; 0 without an error
+    `errors`: tuple of {field, found, allowed}
     """
 
     code: int = 1000
@@ -53,17 +48,7 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """Description of a session.
-
-    Parameters
-    ----------
-    id, group, name, machine, tooling, started : str
-    rate : float [Hz]
-    axes : tuple of str
-    channels : int
-    most_waiting : int
-        Samples that may wait; beyond that the oldest are dropped.
-    """
+    """Description of a session. `rate` [Hz]. `most_waiting`: samples that may wait; beyond that the oldest are dropped."""
 
     id: str
     group: str
@@ -79,14 +64,7 @@ class About:
 
 @dataclass(slots=True, eq=False)
 class Second:
-    """Statistics since the last status.
-
-    Parameters
-    ----------
-    delays : list of float [s]
-    count : int
-    total, square : arrays, shape (a,) [N], [N^2]
-    """
+    """Statistics since the last status. `delays`: list of float [s]. `total`, `square`: arrays, shape (a,) [N], [N^2]."""
 
     total: FloatArray
     square: FloatArray
@@ -100,14 +78,7 @@ class Second:
 
 
 class Session:
-    """The stream of one client.
-
-    Parameters
-    ----------
-    about : About
-    number : int
-        Id of the session towards the stream process.
-    """
+    """The stream of one client. `number`: id of the session towards the stream process."""
 
     def __init__(self, about: About, number: int) -> None:
         self.about, self.number = about, number

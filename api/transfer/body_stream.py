@@ -27,12 +27,8 @@ _DIGEST = re.compile(r"(?:^|,)\s*sha-256=:([A-Za-z0-9+/=]*):")
 async def blocks(request: Request, components: Components) -> AsyncIterator[bytearray]:
     """Yield the body in blocks, within the time limits of uploads.
 
-    Raises
-    ------
-    Problem
-        408 where the client is too slow, 400 where it has disconnected.
-    HTTPException
-        413 where the body is larger than an upload may be.
+    Raises `Problem`: 408 where the client is too slow, 400 where it has disconnected.
+    Raises `HTTPException`: 413 where the body is larger than an upload may be.
     """
     settings, waited, seen, buffer = components.settings, 0.0, 0, bytearray()
     request.state.body.most = settings.max_upload_bytes

@@ -22,14 +22,7 @@ MOST_PARTS, LARGEST_TEXT = 1000, 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """Header of a part.
-
-    Parameters
-    ----------
-    field : str
-    name : str or None
-        Last part of the file name; None where the part is not a file.
-    """
+    """Header of a part. `name`: last part of the file name; None where the part is not a file."""
 
     field: str
     name: str | None
@@ -38,10 +31,7 @@ class Head:
 async def events(request: Request, components: Components) -> AsyncIterator[Head | bytes | None]:
     """Yield the head of each part, its content in pieces, and None at its end.
 
-    Raises
-    ------
-    Problem
-        400 where the body is not a complete form, 408 and 413 as from `blocks`.
+    Raises `Problem`: 400 where the body is not a complete form, 408 and 413 as from `blocks`.
     """
     boundary, parts = parse_options_header(request.headers.get("content-type", ""))[1].get("boundary", ""), 0
     try:

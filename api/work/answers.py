@@ -18,12 +18,8 @@ MOST_BYTES = 64_000_000
 class Answers:
     """Answers of pure functions of their arguments; those that were not asked for longest go first.
 
-    Parameters
-    ----------
-    work : Work
-        Computes what is not known.
-    most : int
-        Bytes that are kept.
+    `work`: computes what is not known
+    `most`: bytes that are kept
     """
 
     def __init__(self, work: Work, most: int = MOST_BYTES) -> None:

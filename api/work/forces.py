@@ -39,16 +39,9 @@ class WornQuestion:
 class ForceQuestion:
     """Query for the forces of a recording.
 
-    Parameters
-    ----------
-    speed : float or None [rad/s]
-        None: from the trigger.
-    method : str
-        resonators or paper.
-    smooth : bool
-    idle : float or None
-        Least share of the time in which no tooth cuts.
-    wear : WornQuestion or None
+    `speed` [rad/s]: None: from the trigger
+    `method`: resonators or paper
+    `idle`: least share of the time in which no tooth cuts
     """
 
     speed: float | None
@@ -74,14 +67,7 @@ def sensors_of(text: str) -> tuple[Sensor, ...]:
 
 
 def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion, source: ReadPair, csv: Path | None = None) -> Any:
-    """Return the forces of a recording as an answer, or write FORCES.csv and return None.
-
-    Parameters
-    ----------
-    source : callable
-        Reads the recording and its air cut.
-    csv : Path, optional
-    """
+    """Return the forces of a recording as an answer, or write FORCES.csv and return None. `source`: reads the recording and its air cut."""
     from rcsa_ident.io.curves.forces import write_forces_csv
     from rcsa_ident.observer.force import restore_mean_force
 

@@ -13,10 +13,7 @@ ANSWERS, OBSERVERS = ("tool-holder", "lobes", "robot"), ("force observer",)
 class Kernels:
     """Compilation that the processes of a service share.
 
-    Parameters
-    ----------
-    folder : Path or None
-        Where they mark what is done; None: each process compiles for itself what is not in the cache.
+    `folder`: where they mark what is done; None: each process compiles for itself what is not in the cache
     """
 
     def __init__(self, folder: Path | None = None) -> None:

@@ -27,22 +27,11 @@ def learn(
 ) -> dict[str, Any]:
     """Return what the cuts and taps of a campaign teach of toolings that are new to a machine.
 
-    Parameters
-    ----------
-    machine : MachineText
-    campaign : Campaign
-        With the cuts and hammer tests whose recordings are there.
-    read, read_test : callable
-    teacher : str
-        What the machine remembers of the campaign.
-    teach : bool
-        Whether the machine that the cuts teach is wanted, too: text and summary of its identification in `taught`; None where
-        something speaks against what was learned.
-
-    Raises
-    ------
-    InputError
-        A measured flange, a campaign that has taught this machine already, or as `learn_toolings`.
+    `campaign`: with the cuts and hammer tests whose recordings are there
+    `teacher`: what the machine remembers of the campaign
+    `teach`: whether the machine that the cuts teach is wanted, too: text and summary of its identification in `taught`; None where
+        something speaks against what was learned
+    Raises `InputError`: a measured flange, a campaign that has taught this machine already, or as `learn_toolings`.
     """
     from rcsa_ident.workflows.identify import hammer_lines, judge, left_out
     from rcsa_ident.workflows.learn_toolings import learn_toolings, learnt_row

@@ -19,13 +19,8 @@ _ALONE = "a cutter without a holder: name one of the library's holders, or send 
 def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[tuple[str, str, tuple[str, ...], str]]:
     """Return for every entry of a library its name, text and assumptions, and the reason where it has no text.
 
-    Parameters
-    ----------
-    raw : bytes
-        JSON, or a .tools container.
-    assumptions : Assumptions
-    contact : str or None
-        Text of the tooling whose contact parameters all toolings get.
+    `raw`: JSON, or a .tools container
+    `contact`: text of the tooling whose contact parameters all toolings get
     """
     if contact is not None:
         known = tooling_of(contact)

@@ -25,12 +25,7 @@ HIGHEST_HZ, MOST_MODES, MOST_UNKNOWNS, MOST_RIVALS, MOST_BANDS, MOST_TOLD = 20_0
 
 
 class MachineCache:
-    """The machines that were asked for last.
-
-    Parameters
-    ----------
-    most : int
-    """
+    """The machines that were asked for last."""
 
     def __init__(self, most: int) -> None:
         self.most = most
@@ -108,10 +103,7 @@ def read(text: str) -> Machine:
 def starts(text: str) -> dict[Dof, Posterior | PlaneUnknowns]:
     """Return what an identification may go on from, axis by axis.
 
-    Raises
-    ------
-    InputError
-        There is none: a measured flange, or a result of the published method.
+    Raises `InputError`: there is none: a measured flange, or a result of the published method.
     """
     if not is_result(text):
         raise InputError("start", "a measured flange", "a machine with an identification by the default method")

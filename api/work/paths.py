@@ -50,25 +50,14 @@ Told = Callable[[str, int, int], None]
 class PathRequest:
     """A path through stock, and what is asked of it.
 
-    Parameters
-    ----------
-    kind : str
-        removal, stability or milling.
-    file, text : str
-        Name and content of the path's file.
-    block : tuple of float [m] or None
-        Lower and upper corner.
-    surface : str
-        Instead of the block, a closed surface: base64 of an STL file.
-    cell, step : float or None [m]
-    speed : float or None [rad/s]
-        Of the spindle, where the path has none.
-    cut : CutSpec
-    method : str
-        One of `stability.lobes.METHODS`.
-    bands, play, weight : bool
-    turn_steps : int
-    cutoff : float [m]
+    `kind`: removal, stability or milling
+    `file`, `text`: name and content of the path's file
+    `block`: tuple of float [m] or None, lower and upper corner
+    `surface`: instead of the block, a closed surface: base64 of an STL file
+    `cell`, `step` [m]
+    `speed` [rad/s]: of the spindle, where the path has none
+    `method`: one of `stability.lobes.METHODS`
+    `cutoff` [m]
     """
 
     kind: str
@@ -143,10 +132,7 @@ def preview(file: str, text: str) -> dict[str, Any]:
 def weighed(machine: MachineText | None, tooling: ToolingSource, request: PathRequest) -> None:
     """Refuse what cannot be read, and what is too large for a job, before it is accepted.
 
-    Raises
-    ------
-    InputError
-        Names the part of the form or the key of its query.
+    Raises `InputError`, which names the part of the form or the key of its query.
     """
     tool, path = tooling_from(tooling), path_of(request.file, request.text)
     if not np.any(path.lengths > 0.0):

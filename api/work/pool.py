@@ -48,18 +48,10 @@ class Pool:
 
     A process is replaced when its query exceeds a limit or is withdrawn: nothing else ends a computation that has begun.
 
-    Parameters
-    ----------
-    workers : int
-    queue : int
-        Calls that may wait beyond the running ones.
-    machines : int
-        Machines that each worker caches.
-    limits : QueryLimits
-        Of each call.
-    several : bool
-        Whether the queue is shared by groups.
-    kernels : Kernels
+    `queue`: calls that may wait beyond the running ones
+    `machines`: machines that each worker caches
+    `limits`: of each call
+    `several`: whether the queue is shared by groups
     """
 
     def __init__(
@@ -101,12 +93,8 @@ class Pool:
     async def run(self, call: Callable[..., T], *arguments: Any) -> T:
         """Return the answer of a call; where the caller is cancelled, the call ends with its process.
 
-        Raises
-        ------
-        Busy
-            The queue is full, or the group's share of it, or a worker was killed from outside.
-        TooLong, InputError
-            The call has exceeded the limit of time, or of memory.
+        Raises `Busy`: the queue is full, or the group's share of it, or a worker was killed from outside.
+        Raises `TooLong`, `InputError`: the call has exceeded the limit of time, or of memory.
         """
         group = GROUP.get()
         if self.threads is None or not self.places.take(group):
@@ -162,13 +150,7 @@ class Pool:
 
 
 class _Call:
-    """A call on its way to a process; without one it only waits until a process is ready.
-
-    Parameters
-    ----------
-    call : callable or None
-    arguments : tuple
-    """
+    """A call on its way to a process; without one it only waits until a process is ready."""
 
     def __init__(self, call: Callable[..., Any] | None = None, arguments: tuple[Any, ...] = ()) -> None:
         self.call, self.arguments = call, arguments

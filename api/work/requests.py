@@ -30,13 +30,7 @@ def anonymous(read: Callable[[_T], _R], each: _T) -> _R:
 
 
 class TooLong(InputError):
-    """Work that is too much for one answer.
-
-    Parameters
-    ----------
-    seconds : float [s]
-        That it takes, estimated.
-    """
+    """Work that is too much for one answer. `seconds` [s]: that it takes, estimated."""
 
     def __init__(self, field: str, found: object, allowed: str, where: str = "", seconds: float = 0.0) -> None:
         super().__init__(field, found, allowed, where)
@@ -70,19 +64,12 @@ class ToolingSource:
 class TipRequest:
     """Tooltip FRF.
 
-    Parameters
-    ----------
-    low : float or None [Hz]
-        None is 100 Hz, or where a measured flange begins.
-    step : float [Hz]
-    high : float or None [Hz]
-        None is the end of the identified band.
-    speed : float or None [rad/s]
-    bands : bool
-    stiffness_spread : float
-        As a share.
-    work_seconds : float [s]
-        Longer work is refused.
+    `low` [Hz]: None is 100 Hz, or where a measured flange begins
+    `step` [Hz]
+    `high` [Hz]: None is the end of the identified band
+    `speed` [rad/s]
+    `stiffness_spread`: as a share
+    `work_seconds` [s]: longer work is refused
     """
 
     low: float | None
@@ -98,21 +85,12 @@ class TipRequest:
 class LobeRequest:
     """Stability limits.
 
-    Parameters
-    ----------
-    cut : CutSpec
-    speeds : tuple of float [rad/s], rising
-    max_depth : float [m]
-    method : str
-        One of `stability.lobes.METHODS`.
-    bands : bool
-    stiffness_spread : float
-    work_seconds : float [s]
-        Longer work is refused.
-    tested : tuple of (speed [rad/s], depth [m], "stable", "chatter" or "marginal")
-        Cuts that were tried.
-    recommend : bool
-        Whether cuts are recommended, too: zero-order limits alone are there at once.
+    `speeds`: tuple of float [rad/s], rising
+    `max_depth` [m]
+    `method`: one of `stability.lobes.METHODS`
+    `work_seconds` [s]: longer work is refused
+    `tested`: tuple of (speed [rad/s], depth [m], "stable", "chatter" or "marginal"); cuts that were tried
+    `recommend`: whether cuts are recommended, too: zero-order limits alone are there at once
     """
 
     cut: CutSpec
@@ -150,17 +128,10 @@ class LobeRequest:
 class AdviceRequest:
     """What a machinist asks of lobes.
 
-    Parameters
-    ----------
-    lobes : LobeRequest
-    max_power : float or None [W]
-    max_torque : float or None [N m]
-    max_speed : float or None [rad/s]
-    tolerance, probability, reserve : float
-        Shares.
-    depth : float or None [m]
-        At which speeds may one cut so deep?
-    planned : tuple of (speed [rad/s], depth [m])
+    `max_power` [W]; `max_torque` [N m]; `max_speed` [rad/s]
+    `tolerance`, `probability`, `reserve`: shares
+    `depth` [m]: at which speeds may one cut so deep?
+    `planned`: tuple of (speed [rad/s], depth [m])
     """
 
     lobes: LobeRequest

@@ -75,13 +75,7 @@ def summary_of(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def modes(text: str) -> dict[str, Any]:
-    """Return the modes of a result that has been checked.
-
-    Raises
-    ------
-    InputError
-        A measured flange has none.
-    """
+    """Return the modes of a result that has been checked. Raises `InputError`: a measured flange has none."""
     if not is_result(text):
         raise InputError("machine", "a measured flange, which has no modes", "a machine with an identification")
     data = json.loads(text)

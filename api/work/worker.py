@@ -24,12 +24,8 @@ _SMALLER = "fewer speeds or frequencies, no bands, zero-order"
 class QueryLimits:
     """What one query may cost.
 
-    Parameters
-    ----------
-    seconds : float [s]
-        By the clock, once a process works on it.
-    memory : int [MiB]
-        Address space beyond that of the idle process.
+    `seconds` [s]: by the clock, once a process works on it
+    `memory` [MiB]: address space beyond that of the idle process
     """
 
     seconds: float = 60.0
@@ -57,11 +53,7 @@ class Failed(Exception):
 class Worker:
     """A process of its own and the line to it; what it answers is JSON, so that tuples come as lists.
 
-    Parameters
-    ----------
-    limits : QueryLimits
-    prepare, spare : callable
-        What the process does before it takes calls, and as soon as no call waits; importable by name.
+    `prepare`, `spare`: what the process does before it takes calls, and as soon as no call waits; importable by name
     """
 
     def __init__(self, limits: QueryLimits, prepare: Callable[[], None], spare: Callable[[], None]) -> None:
@@ -83,13 +75,10 @@ class Worker:
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Return the answer of a call.
 
-        Raises
-        ------
-        TooLong, InputError
-            The call says so, or has exceeded the limit of time, or of memory; then the process is of no further use.
-        Failed
-            The call has raised something else.
-        Killed
+        Raises `TooLong`, `InputError`: the call says so, or has exceeded the limit of time, or of memory; then the process is of no further
+            use.
+        Raises `Failed`: the call has raised something else.
+        Raises `Killed`.
         """
         try:
             kind, answer = self._outcome(call, arguments)

@@ -33,16 +33,11 @@ class PlausibilityCode(RemarkCode):
 class Range:
     """Where the values of a quantity lie.
 
-    Parameters
-    ----------
-    unit : str
-        Of the limits, as a file has it.
-    size : float
-        Of the unit in SI.
-    usual, possible : (float, float) [unit]
-        Outside the first is a remark, outside the second an error; both ends belong to them.
-    slips : tuple of (str, float)
-        Questions with a place for the value that may have been meant, and what leads to it from the one that was given.
+    `unit`: of the limits, as a file has it
+    `size`: of the unit in SI
+    `usual`, `possible`: (float, float) [unit]; outside the first is a remark, outside the second an error; both ends belong to them
+    `slips`: tuple of (str, float); questions with a place for the value that may have been meant, and what leads to it from the one that
+        was given
 
     Examples
     --------
@@ -59,13 +54,7 @@ class Range:
     slips: tuple[tuple[str, float], ...] = ()
 
     def checked(self, field: str, value: float) -> float:
-        """Return a value [SI] that is possible.
-
-        Raises
-        ------
-        InputError
-            With what is usual, and the slip that would explain the value.
-        """
+        """Return a value [SI] that is possible. Raises `InputError` with what is usual, and the slip that would explain the value."""
         value, (low, high) = finite(field, value, self.unit), self.possible
         if not low <= self._given(value) <= high:
             allowed = f"a number at least {low:g} and at most {high:g}" + (f" [{self.unit}]" if self.unit else "")
@@ -113,10 +102,7 @@ def _in_words(field: str) -> str:
 def remarks_of(values: Iterable[tuple[str, Range, float]]) -> list[Remark]:
     """Return what is not usual among values, each a field, its range and the value [SI].
 
-    Raises
-    ------
-    InputError
-        If one of them is not possible.
+    Raises `InputError` if one of them is not possible.
     """
     found = [kind.remark(field, kind.checked(field, value)) for field, kind, value in values]
     return [remark for remark in found if remark is not None]
@@ -127,18 +113,10 @@ def proportion(
 ) -> Remark | None:
     """Return a remark where the ratio of two values is not usual, else None.
 
-    Parameters
-    ----------
-    field : str
-    value : float [-]
-    usual, possible : (float, float) [-]
-    found, wanted : str
-        Both values, and what is asked of them, in words.
-
-    Raises
-    ------
-    InputError
-        If the ratio is not possible.
+    `value` [-]
+    `usual`, `possible`: (float, float) [-]
+    `found`, `wanted`: both values, and what is asked of them, in words
+    Raises `InputError` if the ratio is not possible.
     """
     if not possible[0] - 1e-9 <= value <= possible[1] + 1e-9:
         raise InputError(field, found, wanted)

@@ -15,11 +15,6 @@ class Remark(str):
     """A sentence that also says what it is about: code decides by the code, never by the words.
 
     It is its sentence wherever a text is wanted: in files, on the console, in a report.
-
-    Parameters
-    ----------
-    code : RemarkCode
-    sentence : str
     """
 
     __slots__ = ("code",)

@@ -27,12 +27,8 @@ class ClusterLost(RcsaIdentError):
 class ClusterMap:
     """Works as `map` does: results in the order of the tasks, the first error ends it, and what is not done then is cancelled.
 
-    Parameters
-    ----------
-    client : distributed.Client
-    address : str
-    slots : int
-        Tasks that the cluster ran at once when it was first asked.
+    `client`: distributed.Client
+    `slots`: tasks that the cluster ran at once when it was first asked
     """
 
     client: Any

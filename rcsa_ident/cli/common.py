@@ -109,13 +109,7 @@ def _refuse(sentence: str, code: int, as_json: bool | None, details: dict[str, A
 
 @dataclass(slots=True)
 class Stages:
-    """Progress on stderr and the seconds that each stage took.
-
-    Parameters
-    ----------
-    quiet : bool
-        Nothing is shown, as with ``--json``.
-    """
+    """Progress on stderr and the seconds that each stage took. `quiet`: nothing is shown, as with ``--json``."""
 
     quiet: bool = False
     seconds: dict[str, float] = field(default_factory=dict)

@@ -200,13 +200,7 @@ def read_tests(campaign: Campaign) -> tuple[HammerLines, ...]:
 
 
 def read_start(path: Path) -> Mapping[Dof, Posterior | PlaneUnknowns]:
-    """Return what an earlier answer gives to start from.
-
-    Raises
-    ------
-    InputError
-        If the file holds none, as with the published method.
-    """
+    """Return what an earlier answer gives to start from. Raises `InputError` if the file holds none, as with the published method."""
     from rcsa_ident.io.results.identifications import machine_from_json
     from rcsa_ident.io.results.parts import read_result
 

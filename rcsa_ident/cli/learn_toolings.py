@@ -28,16 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class New:
-    """Where what is learned is written, and how it is told.
-
-    Parameters
-    ----------
-    toolings : Path
-        Folder.
-    machine : Path or None
-        RESULT.json of the machine as it was taught.
-    overwrite, json : bool
-    """
+    """Where what is learned is written, and how it is told. `toolings`: folder. `machine`: RESULT.json of the machine as it was taught."""
 
     toolings: Path
     machine: Path | None

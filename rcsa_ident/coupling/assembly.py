@@ -14,14 +14,9 @@ from rcsa_ident.dynamics.structure import Structure
 def assemble(tool_holder: Structure, spindle: Structure, joint: LumpedJoint) -> Structure:
     """Return tool-holder and spindle in one system, the joint's springs between their flanges.
 
-    Parameters
-    ----------
-    tool_holder : Structure
-        Coordinates at ``tip`` and ``flange``.
-    spindle : Structure
-        Coordinates at ``flange``.
-    joint : LumpedJoint
-        Its springs and dampers tie the two flanges in every direction that the spindle has.
+    `tool_holder`: coordinates at ``tip`` and ``flange``
+    `spindle`: coordinates at ``flange``
+    `joint`: its springs and dampers tie the two flanges in every direction that the spindle has
     """
     d = tool_holder.mass.shape[0]
     mass = scipy.linalg.block_diag(tool_holder.mass, spindle.mass)

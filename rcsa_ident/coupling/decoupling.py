@@ -18,19 +18,10 @@ def decouple(measured: Receptance, tool_holder: Receptance, joint: LumpedJoint |
     With D = A22 + K^-1: B33 = A21 (A11 - C11)^-1 A12 - D where the tip was measured, else B33 = (C33^-1 - D^-1)^-1 at the
     spindle's end of the joint, or B33 = (I - G)^-1 G D with G = C31 A21^-1 across: [inprocess], eq. 10, turned round.
 
-    Parameters
-    ----------
-    measured : Receptance
-        Points ``tip`` or ``spindle`` or both, as `couple` returns them, with all directions of the tool-holder's flange.
-    tool_holder : Receptance
-        Points ``tip`` and ``flange``, at the same frequencies.
-    joint : LumpedJoint or None
-        None is a rigid connection: a real joint then belongs to the flange that comes out.
-
-    Returns
-    -------
-    Receptance
-        Point ``flange``.
+    `measured`: points ``tip`` or ``spindle`` or both, as `couple` returns them, with all directions of the tool-holder's flange
+    `tool_holder`: points ``tip`` and ``flange``, at the same frequencies
+    `joint`: None is a rigid connection: a real joint then belongs to the flange that comes out
+    Returns Receptance: point ``flange``.
     """
     if not np.array_equal(measured.omega, tool_holder.omega):
         raise InputError("measured receptance", f"{measured.omega.size} frequencies", "the tool-holder's frequencies")
@@ -58,14 +49,9 @@ def decouple(measured: Receptance, tool_holder: Receptance, joint: LumpedJoint |
 def interface_receptance(tool_holder: Receptance, directions: tuple[Dof, ...], joint: LumpedJoint | None) -> ComplexArray:
     """Return A22 + K^-1, shape (n, d, d): what the spindle's flange is coupled to.
 
-    Parameters
-    ----------
-    tool_holder : Receptance
-        Point ``flange`` among its points.
-    directions : tuple of Dof, length d
-        Of the flange, in the tool-holder's order.
-    joint : LumpedJoint or None
-        None is a rigid connection.
+    `tool_holder`: point ``flange`` among its points
+    `directions`: tuple of Dof, length d; of the flange, in the tool-holder's order
+    `joint`: None is a rigid connection
     """
     interface = np.array(tool_holder["flange", "flange"])
     if joint is not None:
@@ -80,16 +66,9 @@ def with_slope(translations: ComplexArray, positions: FloatArray) -> ComplexArra
     The polynomial through k points gives the slope's weights W at the first; H = W H_k W^T: errors of order k - 1 in the
     spacing, noise grown by about the inverse spacing for each rotation.
 
-    Parameters
-    ----------
-    translations : complex array, shape (n, k, k) [m/N]
-        Receptances between all pairs of points, two at least.
-    positions : array, shape (k,) [m]
-        Along z from the tip towards the spindle.
-
-    Returns
-    -------
-    complex array, shape (n, 2, 2)
+    `translations` [m/N], shape (n, k, k): receptances between all pairs of points, two at least
+    `positions` [m], shape (k,): along z from the tip towards the spindle
+    Returns a complex array of shape (n, 2, 2).
     """
     offset = np.asarray(positions, dtype=float) - positions[0]
     count = offset.size

@@ -33,15 +33,10 @@ _ENTRIES[0, 0, 0] = _ENTRIES[1, 0, 1] = _ENTRIES[1, 1, 0] = _ENTRIES[2, 1, 1] = 
 class Observation:
     """One measured entry of an assembly with one known tool-holder.
 
-    Parameters
-    ----------
-    tool_holder : Receptance
-        One bending plane, points ``tip`` and ``flange``.
-    row, col : str
-        ``tip`` or ``spindle``: where translation is seen and force applied.
-    values : complex array, shape (n,) [m/N]
-    std : array, shape (n,), or float [m/N]
-        Standard deviation of the real and of the imaginary part each.
+    `tool_holder`: one bending plane, points ``tip`` and ``flange``
+    `row`, `col`: ``tip`` or ``spindle``: where translation is seen and force applied
+    `values` [m/N], shape (n,)
+    `std`: array, shape (n,), or float [m/N]; standard deviation of the real and of the imaginary part each
     """
 
     tool_holder: Receptance
@@ -67,25 +62,14 @@ class Observation:
 class DecoupledFlange:
     """A flange found from several toolings.
 
-    Parameters
-    ----------
-    receptance : Receptance
-        Point ``flange``: [[h_tF, h_tM], [h_rF, h_rM]], symmetric.
-    std : array, shape (n, 2, 2)
-        Standard deviation of the real and of the imaginary part each; the prior's share is in it where there is one.
-    condition : array, shape (n,) [-]
-        Condition number of each frequency's equations, noise-weighted and scaled to the entries' own size.
-    chi2 : array, shape (n,)
-        Sum of squared residuals in standard deviations; `freedom` is expected where measurements outnumber unknowns.
-    freedom : int
-        Real measurements less real unknowns at a frequency.
-    regularised : array of bool, shape (n,)
-        True where neighbouring frequencies were needed as a prior.
-    ambiguous : array of bool, shape (n,)
-        True where another passive solution explains the measurements as well.
-    dissipation : array, shape (n,) [-]
-        Below zero the result feeds energy in: noise, or a tool-holder that is not as modelled.
-    notes : tuple of str
+    `receptance`: point ``flange``: [[h_tF, h_tM], [h_rF, h_rM]], symmetric
+    `std`, shape (n, 2, 2): standard deviation of the real and of the imaginary part each; the prior's share is in it where there is one
+    `condition` [-], shape (n,): condition number of each frequency's equations, noise-weighted and scaled to the entries' own size
+    `chi2`, shape (n,): sum of squared residuals in standard deviations; `freedom` is expected where measurements outnumber unknowns
+    `freedom`: real measurements less real unknowns at a frequency
+    `regularised`: array of bool, shape (n,); True where neighbouring frequencies were needed as a prior
+    `ambiguous`: array of bool, shape (n,); True where another passive solution explains the measurements as well
+    `dissipation` [-], shape (n,): below zero the result feeds energy in: noise, or a tool-holder that is not as modelled
     """
 
     receptance: Receptance

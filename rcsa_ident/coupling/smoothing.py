@@ -16,14 +16,9 @@ def bending(omega: FloatArray, size: FloatArray, least_damping: float) -> Bend:
 
     The peak of a mode with damping zeta bends by 2 |h| (step / (zeta omega))^2 from one frequency to the next.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-        Ascending.
-    size : array, shape (n, 3)
-        Usual size |h| of the three entries.
-    least_damping : float [-]
-        Damping ratio below which no mode is expected.
+    `omega` [rad/s], shape (n,): ascending
+    `size`, shape (n, 3): usual size |h| of the three entries
+    `least_damping` [-]: damping ratio below which no mode is expected
     """
     before, after = np.diff(omega)[:-1], np.diff(omega)[1:]
     weights = np.stack([2.0 * after, -2.0 * (before + after), 2.0 * before], axis=1) / (before + after)[:, None]
@@ -64,17 +59,11 @@ def _banded(precision: ComplexArray, bend: Bend, size: FloatArray) -> ComplexArr
 def band_solve(precision: ComplexArray, right: ComplexArray, bend: Bend, size: FloatArray, at: ComplexArray | None = None) -> ComplexArray:
     """Return the solution x of (precision + prior) x = right - prior at, shape (n, 3).
 
-    Parameters
-    ----------
-    precision : complex array, shape (n, 3, 3)
-        What the measurements say at each frequency, Hermitian.
-    right : complex array, shape (n, 3)
-    bend : tuple of arrays
-        The prior, from `bending`.
-    size : array, shape (n, 3)
-        Scale of the unknowns: the equations are solved in units of it.
-    at : complex array, shape (n, 3), optional
-        Point of linearisation from which the prior already pulls; by default 0.
+    `precision`, shape (n, 3, 3): what the measurements say at each frequency, Hermitian
+    `right`, shape (n, 3)
+    `bend`: the prior, from `bending`
+    `size`, shape (n, 3): scale of the unknowns: the equations are solved in units of it
+    `at`, shape (n, 3): point of linearisation from which the prior already pulls; by default 0
     """
     n = right.shape[0]
     target = right * size
@@ -93,15 +82,10 @@ def band_covariance(precision: ComplexArray, bend: Bend, size: FloatArray, windo
 
     Window by window: what lies farther away than the margin no longer matters.
 
-    Parameters
-    ----------
-    precision : complex array, shape (n, 3, 3)
-    bend : tuple of arrays
-        The prior, from `bending`.
-    size : array, shape (n, 3)
-        Scale of the unknowns.
-    window, margin : int
-        Frequencies whose blocks come from one inverse, and how many more stand on each side of them.
+    `precision`, shape (n, 3, 3)
+    `bend`: the prior, from `bending`
+    `size`, shape (n, 3): scale of the unknowns
+    `window`, `margin`: frequencies whose blocks come from one inverse, and how many more stand on each side of them
     """
     n = precision.shape[0]
     band = _banded(precision, bend, size)

@@ -35,20 +35,12 @@ _OTHER_AXES = "sign or axes of the sensors may be others than told: they can be 
 class ForceCalibration:
     """Cutting and edge coefficients with 95 % intervals: F = K_c h b + K_e b for each direction.
 
-    Parameters
-    ----------
-    method : str
-        ``mean`` or ``signal``.
-    names : tuple of str, length p
-        The coefficients that were fitted, out of `NAMES`.
-    value : array, shape (p,) [N/m^2 or N/m]
-    covariance : array, shape (p, p)
-    half_width : array, shape (p,)
-        Half widths of the 95 % intervals, by a t-distribution.
-    misfit : float [-]
-        Root mean square of what is left over that of the forces.
-    reasons, notes : tuples of str
-        Why the answer is suspect; what was found beside it.
+    `method`: ``mean`` or ``signal``
+    `names`: tuple of str, length p; the coefficients that were fitted, out of `NAMES`
+    `value` [N/m^2 or N/m], shape (p,); `covariance`, shape (p, p)
+    `half_width`, shape (p,): half widths of the 95 % intervals, by a t-distribution
+    `misfit` [-]: root mean square of what is left over that of the forces
+    `reasons`, `notes`: why the answer is suspect; what was found beside it
     """
 
     method: str
@@ -203,12 +195,8 @@ def _runout_effect(cutter: Cutter, conditions: CuttingConditions, solution: Floa
 def plausible(names: Sequence[str], value: FloatArray, half_width: FloatArray) -> tuple[str, ...]:
     """Return what speaks against a set of coefficients, in words.
 
-    Parameters
-    ----------
-    names : sequence of str, length p
-        Out of `NAMES`.
-    value, half_width : arrays, shape (p,) [N/m^2 or N/m]
-        Coefficients and half widths of their 95 % intervals.
+    `names`: sequence of str, length p; out of `NAMES`
+    `value`, `half_width` [N/m^2 or N/m], shape (p,): coefficients and half widths of their 95 % intervals
     """
     known = dict(zip(names, zip(value.tolist(), half_width.tolist(), strict=True), strict=True))
     reasons = []

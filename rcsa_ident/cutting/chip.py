@@ -15,16 +15,8 @@ _POINTS = 65
 def thickest_share(cutter: Cutter, engagement: AnyEngagement, depth: float) -> float:
     """Return the largest chip thickness over the feed per tooth, sin(phi) sin(kappa) somewhere in the cut, of equal teeth.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    engagement : Engagement, Block, Stepover or EngagementMap
-    depth : float [m]
-
-    Raises
-    ------
-    InputError
-        If nothing cuts.
+    `depth` [m]
+    Raises `InputError` if nothing cuts.
 
     Examples
     --------

@@ -25,10 +25,7 @@ _SPREADS = ("tangential_spread", "ratio_spread", "edge_spread")
 def checked_coefficient(field: str, value: float) -> float:
     """Return the value of a field of `CuttingCoefficients` where it is possible.
 
-    Raises
-    ------
-    InputError
-        The field is unknown, or the value impossible.
+    Raises `InputError`: the field is unknown, or the value impossible.
     """
     if field in _RANGES:
         name, kind = _RANGES[field]

@@ -93,10 +93,7 @@ class Engagement(Shown):
 class Block(Shown):
     """A cutter that goes into a block with straight sides: slots, face mills over a plate, a first pass at a wall.
 
-    Parameters
-    ----------
-    y_from, y_to : float [m]
-        Its sides beside the cutter's path, along the normal direction Y; y_from below y_to.
+    `y_from`, `y_to` [m]: its sides beside the cutter's path, along the normal direction Y; y_from below y_to
 
     Examples
     --------
@@ -140,12 +137,8 @@ class Block(Shown):
 class Stepover(Shown):
     """The same radial width at every height, as where the pass before was cut by the same cutter.
 
-    Parameters
-    ----------
-    width : float [m]
-        a_e; where the cutter is narrower, it cuts all round.
-    strategy : str
-        ``up`` or ``down``.
+    `width` [m]: a_e; where the cutter is narrower, it cuts all round
+    `strategy`: ``up`` or ``down``
     """
 
     width: float
@@ -181,15 +174,10 @@ class Stepover(Shown):
 class EngagementMap(Shown):
     """A table of arcs over the height, as CAM systems and removal simulations give it, and leaning tools need it.
 
-    Parameters
-    ----------
-    z : array, shape (n,) [m]
-        Heights above the tip, never falling; one that stands several times has several arcs.
-    start, end : arrays, shape (n,) [rad]
-        Of each arc. Between heights that have as many arcs they change on straight lines, else those of the lower one go on; below the
-        first height and above the last one nothing is cut.
-    feed_rise : float [rad], default 0
-        Angle between the feed and the plane across the tool's axis, towards the spindle.
+    `z` [m], shape (n,): heights above the tip, never falling; one that stands several times has several arcs
+    `start`, `end` [rad], shape (n,): of each arc. Between heights that have as many arcs they change on straight lines, else those of the
+        lower one go on; below the first height and above the last one nothing is cut.
+    `feed_rise` [rad], default 0: angle between the feed and the plane across the tool's axis, towards the spindle
     """
 
     z: FloatArray
@@ -249,13 +237,7 @@ AnyEngagement = Engagement | Block | Stepover | EngagementMap
 
 
 def widest(engagement: AnyEngagement, profile: Profile, depth: float) -> Engagement:
-    """Return the smallest engagement that holds all arcs of an outline up to a depth [m].
-
-    Raises
-    ------
-    InputError
-        If nothing is cut.
-    """
+    """Return the smallest engagement that holds all arcs of an outline up to a depth [m]. Raises `InputError` if nothing is cut."""
     if isinstance(engagement, Engagement):
         return engagement
     parts = [segment.at(np.linspace(a, b, 17)) for segment, a, b in profile.pieces(depth, engagement.radii, engagement.heights)]
@@ -269,10 +251,7 @@ def widest(engagement: AnyEngagement, profile: Profile, depth: float) -> Engagem
 def same_everywhere(engagement: AnyEngagement) -> Engagement:
     """Return the engagement of a cut whose edge is in the material between the same angles at all heights.
 
-    Raises
-    ------
-    InputError
-        If it changes along the edge.
+    Raises `InputError` if it changes along the edge.
     """
     if isinstance(engagement, Engagement):
         return engagement
@@ -288,14 +267,8 @@ EngagementProfile = Callable[[float, float], FloatArray]
 class CuttingConditions(Shown):
     """A cut with constant conditions.
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-    axial_depth : float [m]
-    feed_per_tooth : float [m]
-    engagement : Engagement, Block, Stepover or EngagementMap
-    feed_angle : float [rad], default 0
-        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
+    `spindle_speed` [rad/s]; `axial_depth` [m]; `feed_per_tooth` [m]
+    `feed_angle` [rad], default 0: direction of the feed in the machine's X-Y plane, from +X towards +Y
     """
 
     spindle_speed: float

@@ -26,11 +26,8 @@ def has_corner(cutter: Cutter) -> bool:
 def with_corner(cutter: Cutter, radius: float) -> Cutter:
     """Return the same cutter with another corner radius [m], 0 for a sharp one; its length of cut stays.
 
-    Parameters
-    ----------
-    cutter : Cutter
-        One that has a corner.
-    radius : float [m]
+    `cutter`: one that has a corner
+    `radius` [m]
     """
     if non_negative("corner radius", radius, "m") == 0.0:
         return replace(cutter, corner_radius=0.0, profile=None)

@@ -28,21 +28,14 @@ class ToolDeflection:
     repeated until it settles, point by point. With the helix a cut deeper than R arccos(1 - a_e / R) / tan(helix) has points
     beyond which nothing cuts at that instant: the deflection stops growing there.
 
-    Parameters
-    ----------
-    length : float [m]
-        From the tip to where the tool is clamped.
-    bending_stiffness : float [N m^2]
-        E I of the tool.
-    machine_yy, machine_yx : float [m/N]
-        Static compliance of the machine at the tool: motion off the wall (normal) per force in normal and in feed direction.
-    feed_rate : float or None [m/s]
-        Kept at all speeds; without it the process's feed per tooth is.
-    chip_reduction : {"none", "literal"}
-        "literal" also takes the shift of the entry off the chip, as [du2023] prints it; each tooth finds the same deflection,
-        so that in a steady cut the mean chip is what it was.
-    all_teeth : bool
-        Forces of all teeth in the cut at that instant; [du2023] counts one tooth.
+    `length` [m]: from the tip to where the tool is clamped
+    `bending_stiffness` [N m^2]: E I of the tool
+    `machine_yy`, `machine_yx` [m/N]: static compliance of the machine at the tool: motion off the wall (normal) per force in normal and in
+        feed direction
+    `feed_rate` [m/s]: kept at all speeds; without it the process's feed per tooth is
+    `chip_reduction`: {"none", "literal"}; "literal" also takes the shift of the entry off the chip, as [du2023] prints it; each tooth finds
+        the same deflection, so that in a steady cut the mean chip is what it was
+    `all_teeth`: forces of all teeth in the cut at that instant; [du2023] counts one tooth
     """
 
     length: float
@@ -77,15 +70,10 @@ class ToolDeflection:
 class DeflectedEdge:
     """Where each point of the edge enters and leaves, bent by the cut.
 
-    Parameters
-    ----------
-    height : array, shape (n,) [m]
-        Distances from the tip.
-    deflection : array, shape (n,) [m]
-        Off the wall, at the instant at which the point generates it.
-    start, end : arrays, shape (n,) [rad]
-    settled : bool
-        Whether the iteration ended at every point.
+    `height` [m], shape (n,): distances from the tip
+    `deflection` [m], shape (n,): off the wall, at the instant at which the point generates it
+    `start`, `end` [rad], shape (n,)
+    `settled`: whether the iteration ended at every point
     """
 
     height: FloatArray
@@ -98,18 +86,9 @@ class DeflectedEdge:
 def deflected_edge(process: MillingProcess, deflection: ToolDeflection, speed: float, depth: float) -> DeflectedEdge:
     """Return the deflection along the edge, and the angles between which it cuts.
 
-    Parameters
-    ----------
-    process : MillingProcess
-        Down-milling up to pi or up-milling from 0.
-    deflection : ToolDeflection
-    speed : float [rad/s]
-    depth : float [m]
-
-    Raises
-    ------
-    InputError
-        If the cut generates no wall, or is deeper than the tool is long.
+    `process`: down-milling up to pi or up-milling from 0
+    `speed` [rad/s]; `depth` [m]
+    Raises `InputError` if the cut generates no wall, or is deeper than the tool is long.
     """
     if not process.cutter.is_cylinder:
         raise InputError("cutter", str(process.cutter), "a cylinder with one helix: of other shapes no deflection is computed")
@@ -177,13 +156,8 @@ def _bending(height: FloatArray, deflection: ToolDeflection) -> FloatArray:
 class DeflectedEngagement:
     """The `EngagementProfile` of a deflected tool.
 
-    Parameters
-    ----------
-    process : MillingProcess
-        As it would be without deflection.
-    deflection : ToolDeflection
-    slices_per_metre : float [1/m]
-        Parts of the edge, at least four.
+    `process`: as it would be without deflection
+    `slices_per_metre` [1/m]: parts of the edge, at least four
     """
 
     process: MillingProcess

@@ -14,18 +14,9 @@ def mean_directional_matrix(teeth: int, engagement: Engagement, coefficients: Cu
 
     F = a K_tc [alpha] {X(t) - X(t - tau)}; closed form, exact.
 
-    Parameters
-    ----------
-    teeth : int
-    engagement : Engagement
-    coefficients : CuttingCoefficients
-        Only the radial ratio counts.
-    feed_angle : float [rad]
-        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
-
-    Returns
-    -------
-    array, shape (2, 2) [-]
+    `coefficients`: only the radial ratio counts
+    `feed_angle` [rad]: direction of the feed in the machine's X-Y plane, from +X towards +Y
+    Returns an array of shape (2, 2) [-].
     """
 
     def primitive(phi: float) -> FloatArray:

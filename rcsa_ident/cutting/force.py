@@ -38,11 +38,7 @@ UNIT_NAMES = ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")
 class ForceCoefficient:
     """An unknown of the simulated forces: the logarithm of a cutting coefficient's scale, or a run-out in `REFERENCE_RUNOUT`.
 
-    Parameters
-    ----------
-    term : ForceTerm
-    tooling : str
-        Whose it is; empty where all toolings have it in common.
+    `tooling`: whose it is; empty where all toolings have it in common
     """
 
     term: ForceTerm
@@ -81,20 +77,10 @@ def tooth_force(
 ) -> FloatArray:
     """Return the force of one cutting tooth on the tool per width of edge, (feed, normal, axial).
 
-    Parameters
-    ----------
-    phi : array, shape (n,) [rad]
-        Immersion, clockwise from the normal direction.
-    chip : array, shape (n,) [m]
-        Chip thickness, across the edge; the tooth is taken to be in the material.
-    coefficients : CuttingCoefficients
-    kappa : float or array, shape (n,) [rad], default a wall
-        Angle of the edge's outward normal, from the axis pointing down.
-
-    Returns
-    -------
-    array, shape (n, 3) [N/m]
-        The third one from the spindle towards the tip, -z.
+    `phi` [rad], shape (n,): immersion, clockwise from the normal direction
+    `chip` [m], shape (n,): chip thickness, across the edge; the tooth is taken to be in the material
+    `kappa`: float or array, shape (n,) [rad], default a wall; angle of the edge's outward normal, from the axis pointing down
+    Returns an array of shape (n, 3) [N/m]: the third one from the spindle towards the tip, -z.
     """
     s, c, sine, cosine = np.sin(phi), np.cos(phi), np.sin(kappa), np.cos(kappa)
     tangential = coefficients.tangential * chip + coefficients.tangential_edge
@@ -181,27 +167,12 @@ def unit_lines(
 ) -> ComplexArray:
     """Return the lines per unit of K_tc, K_rc, K_te, K_re, K_ac and K_ae: the force is linear in them.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    orders : array of int, shape (m,)
-        Multiples of the spindle frequency.
-    runout : bool
-        Whether teeth may cut deeper, late or not at all, as with `runout_force_lines`.
-    axial : bool
-        Whether the force along z, from the tip to the spindle, is told, too.
-
-    Returns
-    -------
-    complex array, shape (m, 2 or 3, 6) [m^2, m^2, m, m, m^2, m]
-        In machine axes. Where the edge stands upright the last two columns have no part in X and Y; where it leans they go with those of
-        K_rc and K_re, and one depth in X and Y tells their sum alone.
-
-    Raises
-    ------
-    InputError
-        As in `force_lines`.
+    `orders`: array of int, shape (m,); multiples of the spindle frequency
+    `runout`: whether teeth may cut deeper, late or not at all, as with `runout_force_lines`
+    `axial`: whether the force along z, from the tip to the spindle, is told, too
+    Returns a complex array of shape (m, 2 or 3, 6) [m^2, m^2, m, m, m^2, m]: in machine axes. Where the edge stands upright the last two
+        columns have no part in X and Y; where it leans they go with those of K_rc and K_re, and one depth in X and Y tells their sum alone.
+    Raises `InputError` as in `force_lines`.
     """
     orders = np.asarray(orders)
     components = 3 if axial else 2
@@ -248,19 +219,10 @@ def force_and_slope(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return the lines of `force_lines`, and how their logarithms change with what is never known exactly.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
-    orders : array of int, shape (m,)
-        Multiples of the spindle frequency.
-
-    Returns
-    -------
-    complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]
-        The last axis is `SLOPES`: logarithms of K_tc, k_rc, K_te and K_re, and a run-out in units of `REFERENCE_RUNOUT`, whose
-        effect on the lines that all teeth share is a secant: teeth leave the material early. 0 where there is no force.
+    `orders`: array of int, shape (m,); multiples of the spindle frequency
+    Returns complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]: the last axis is `SLOPES`: logarithms of K_tc, k_rc, K_te and K_re, and a
+        run-out in units of `REFERENCE_RUNOUT`, whose effect on the lines that all teeth share is a secant: teeth leave the material early.
+        0 where there is no force.
     """
     values = _values(coefficients)
     parts = unit_lines(cutter, conditions, orders) * values
@@ -277,17 +239,8 @@ def axial_and_slope(
 ) -> tuple[ComplexArray, dict[ForceTerm, ComplexArray]]:
     """Return the lines of the force along z, from the tip to the spindle, and how their logarithms change; without run-out.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
-    orders : array of int, shape (m,)
-        Multiples of the spindle frequency.
-
-    Returns
-    -------
-    complex array, shape (m,) [N], and one of the same shape for each term but the run-out; 0 where there is no force
+    `orders`: array of int, shape (m,); multiples of the spindle frequency
+    Returns a complex array of shape (m,) [N], and one of the same shape for each term but the run-out; 0 where there is no force.
     """
     parts = unit_lines(cutter, conditions, orders, axial=True)[:, 2] * _values(coefficients)
     total = parts.sum(axis=1)
@@ -373,13 +326,9 @@ def scaled_force(slope: ComplexArray, logs: FloatArray, exact: Mapping[ForceTerm
     Terms that are told in `exact` add up, K_tc e^t (U_1 + k_rc e^r U_2) + K_te e^p U_3 + K_re e^q U_4, with the shares of the sum that
     their slopes are at the values that were told; the others multiply.
 
-    Parameters
-    ----------
-    slope : complex array, shape (n, c) [-]
-        Change of the simulated force's logarithm with each unknown.
-    logs : array, shape (c,)
-    exact : mapping of ForceTerm to int
-        Places of the terms that add up among the unknowns.
+    `slope` [-], shape (n, c): change of the simulated force's logarithm with each unknown
+    `logs`, shape (c,)
+    `exact`: places of the terms that add up among the unknowns
     """
     if not exact:
         return np.exp(slope @ logs), slope

@@ -30,14 +30,9 @@ CLEAR = 1.25
 class AxesChoice:
     """One assignment of a dynamometer's channels to the axes of the force on the tool.
 
-    Parameters
-    ----------
-    axes : array, shape (c, c)
-        Channels (told as X, Y and, where there is one, Z) over the force on the tool: a signed permutation.
-    forces : ForceCalibration
-        What the mean forces say then.
-    unexplained : float
-        Share of the force over time that the same coefficients leave, each cut's tooth angle free.
+    `axes`, shape (c, c): channels (told as X, Y and, where there is one, Z) over the force on the tool: a signed permutation
+    `forces`: what the mean forces say then
+    `unexplained`: share of the force over time that the same coefficients leave, each cut's tooth angle free
     """
 
     axes: FloatArray
@@ -61,15 +56,8 @@ class AxesChoice:
 def axes_choices(records: Sequence[ForceRecord]) -> tuple[AxesChoice, ...]:
     """Return all assignments of axes and signs that cutting coefficients allow, the one that explains most of the force first.
 
-    Parameters
-    ----------
-    records : sequence of ForceRecord, length n
-        Three at least, at two different feeds; two channels (8 choices) or three (48).
-
-    Raises
-    ------
-    InputError
-        No choice is physical, or the cuts tell no coefficients at all.
+    `records`: sequence of ForceRecord, length n; three at least, at two different feeds; two channels (8 choices) or three (48)
+    Raises `InputError`: no choice is physical, or the cuts tell no coefficients at all.
     """
     count = min(r.lines.shape[1] for r in records)
     whole = [r if r.lines.shape[1] == count else r.transverse for r in records]

@@ -28,11 +28,8 @@ WORTH = 1.2
 def told_across(omega: FloatArray, force: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Return middles of bands [rad/s] and how much the least told direction of the force is told in each, from 0 to 1 / sqrt(2).
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-    force : complex array, shape (n, 2) [N]
-        Of each line along X and Y, up to a phase; bands with one line alone tell nothing across it.
+    `omega` [rad/s], shape (n,)
+    `force` [N], shape (n, 2): of each line along X and Y, up to a phase; bands with one line alone tell nothing across it
     """
     size = np.linalg.norm(force, axis=1)
     # what rounding leaves of a constant force is no line
@@ -52,10 +49,7 @@ def told_across(omega: FloatArray, force: ComplexArray) -> tuple[FloatArray, Flo
 def gain_across(one: Sequence[tuple[FloatArray, ComplexArray]], other: Sequence[tuple[FloatArray, ComplexArray]]) -> float:
     """Return how much better the least told direction is told where half of some cuts are made in another way [-].
 
-    Parameters
-    ----------
-    one, other : sequences of (omega, force)
-        Lines of the same cuts, made the first way and the other.
+    `one`, `other`: sequences of (omega, force); lines of the same cuts, made the first way and the other
     """
     mixed = [each[k % 2] for k, each in enumerate(zip(one, other, strict=True))]
     before, after = (_mean_told(lines) for lines in (one, mixed))

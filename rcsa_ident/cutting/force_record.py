@@ -22,19 +22,12 @@ HARMONICS = 3
 class ForceRecord:
     """The lines of one cut's force, F = Re sum_m lines[m] e^{i m angle}, by least squares over its time series.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-        The cut as programmed, with the spindle speed that was found in the record.
-    clamping : str
-        Records of one clamping share the run-out.
-    lines : complex array, shape (m + 1, c) [N]
-        Orders 0 to m; X and Y and, where it is measured, along the axis. Sensors with a known response are undone.
-    variance : array, shape (m + 1, c) [N^2]
-        Variance of the real and of the imaginary part each, noise only.
-    blocks : complex array, shape (b, m + 1, c) [N]
-        What each block of whole revolutions says more or less than all of them: their mean is near zero.
+    `conditions`: the cut as programmed, with the spindle speed that was found in the record
+    `clamping`: records of one clamping share the run-out
+    `lines` [N], shape (m + 1, c): orders 0 to m; X and Y and, where it is measured, along the axis. Sensors with a known response are
+        undone.
+    `variance` [N^2], shape (m + 1, c): variance of the real and of the imaginary part each, noise only
+    `blocks` [N], shape (b, m + 1, c): what each block of whole revolutions says more or less than all of them: their mean is near zero
     """
 
     cutter: Cutter
@@ -76,10 +69,8 @@ class ForceRecord:
 
         The share is that of the first lines: the mean force says nothing of an angle, and high up dynamometers ring.
 
-        Parameters
-        ----------
-        coefficients : array, shape (4,) [N/m^2 or N/m]
-            K_tc, K_rc, K_te, K_re; of a leaning edge the radial ones stand for the axial ones as well.
+        `coefficients` [N/m^2 or N/m], shape (4,): K_tc, K_rc, K_te, K_re; of a leaning edge the radial ones stand for the axial ones as
+            well
         """
         orders = self.own_orders[1:]
         orders = orders[orders <= HARMONICS * self.cutter.teeth]

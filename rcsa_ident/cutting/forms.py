@@ -76,9 +76,7 @@ def exponential_form(form: FloatArray) -> ComplexArray:
 def mean_over_turn(rows: Rows, form: FloatArray) -> FloatArray:
     """Return the mean over the rotation of what rows do per width, summed over them: shape (directions, ...).
 
-    Parameters
-    ----------
-    form : array, shape (rows, 5, ...)
+    `form`, shape (rows, 5, ...)
     """
     start, end = rows.start, rows.end
     basis = [end - start, np.sin(end) - np.sin(start), np.cos(start) - np.cos(end)]

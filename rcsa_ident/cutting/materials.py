@@ -22,15 +22,8 @@ _COEFFICIENTS = {
 class CuttingMaterial:
     """A workpiece material as one source has cut it.
 
-    Parameters
-    ----------
-    name : str
-    condition : str
-        Cutter, lubrication, feed: what the coefficients hold for.
-    coefficients : CuttingCoefficients
-        Their spreads are what the user of another cutter has to expect.
-    source : str
-    notes : str
+    `condition`: cutter, lubrication, feed: what the coefficients hold for
+    `coefficients`: their spreads are what the user of another cutter has to expect
     """
 
     name: str

@@ -26,17 +26,11 @@ _RAKE = np.radians(60.0)
 class OrthogonalData(Shown):
     """What orthogonal cutting of a material has told, over rake angle alpha and chip thickness h.
 
-    Parameters
-    ----------
-    shear_stress : float [N/m^2]
-        In the shear plane.
-    friction, friction_rake : float [rad], [-]
-        Friction angle beta = friction + friction_rake alpha.
-    ratio, ratio_rake : float [-], [1/rad]
-        Chip ratio r = (ratio + ratio_rake alpha) (h / 1 mm)^(power + power_rake alpha).
-    power, power_rake : float [-], [1/rad]
-    source : str
-        Who has measured it.
+    `shear_stress` [N/m^2]: in the shear plane
+    `friction`, `friction_rake`: float [rad], [-]; friction angle beta = friction + friction_rake alpha
+    `ratio`, `ratio_rake`: float [-], [1/rad]; chip ratio r = (ratio + ratio_rake alpha) (h / 1 mm)^(power + power_rake alpha)
+    `power`, `power_rake`: float [-], [1/rad]
+    `source`: who has measured it
 
     Examples
     --------
@@ -63,18 +57,10 @@ class OrthogonalData(Shown):
     def coefficients(self, rake: FloatArray | float, inclination: FloatArray | float, chip: FloatArray | float) -> FloatArray:
         """Return K_tc, K_rc and K_ac of edges, shape (3, ...) [N/m^2].
 
-        Parameters
-        ----------
-        rake : array [rad]
-            Normal to the edge.
-        inclination : array [rad]
-            Of the edge out of what stands square to the cutting speed; the chip flows off at the same angle (Stabler).
-        chip : array [m]
-
-        Raises
-        ------
-        InputError
-            If the chip is not above zero, an angle is out of range, or no shear angle belongs to them.
+        `rake` [rad]: normal to the edge
+        `inclination` [rad]: of the edge out of what stands square to the cutting speed; the chip flows off at the same angle (Stabler)
+        `chip` [m]
+        Raises `InputError` if the chip is not above zero, an angle is out of range, or no shear angle belongs to them.
         """
         alpha, i, h = (np.asarray(values, dtype=float) for values in (rake, inclination, chip))
         if not np.all(h > 0.0):
@@ -115,11 +101,8 @@ def inclinations(cutter: Cutter, rows: Rows) -> FloatArray:
 def insert_angles(axial_rake: float, radial_rake: float, kappa: FloatArray | float) -> tuple[FloatArray, FloatArray]:
     """Return true rake and inclination of an insert's edge from the rakes that makers print [rad].
 
-    Parameters
-    ----------
-    axial_rake, radial_rake : float [rad]
-    kappa : array [rad]
-        Of the edge, 90 degrees less the corner angle C: tan T = tan R cos C + tan A sin C, tan I = tan A cos C - tan R sin C.
+    `axial_rake`, `radial_rake` [rad]
+    `kappa` [rad]: of the edge, 90 degrees less the corner angle C: tan T = tan R cos C + tan A sin C, tan I = tan A cos C - tan R sin C
     """
     sine, cosine = np.sin(kappa), np.cos(kappa)
     a, r = np.tan(axial_rake), np.tan(radial_rake)
@@ -129,13 +112,7 @@ def insert_angles(axial_rake: float, radial_rake: float, kappa: FloatArray | flo
 def coefficients_at(cutter: Cutter, rows: Rows, data: OrthogonalData, rake: float) -> FloatArray:
     """Return K_tc, K_rc and K_ac of each row at the mean chip along its arc, shape (3, rows) [N/m^2].
 
-    Parameters
-    ----------
-    cutter : Cutter
-    rows : Rows
-    data : OrthogonalData
-    rake : float [rad]
-        Normal to the edge, the same everywhere.
+    `rake` [rad]: normal to the edge, the same everywhere
     """
     return data.coefficients(rake, inclinations(cutter, rows), _mean_chip(rows))
 
@@ -143,13 +120,7 @@ def coefficients_at(cutter: Cutter, rows: Rows, data: OrthogonalData, rake: floa
 def coefficients_of_cut(cutter: Cutter, conditions: CuttingConditions, data: OrthogonalData, rake: float) -> CuttingCoefficients:
     """Return the constant coefficients that stand for those of all rows of a cut, each weighed by the chip that it cuts.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    data : OrthogonalData
-    rake : float [rad]
-        Normal to the edge.
+    `rake` [rad]: normal to the edge
     """
     rows = rows_of(cutter, conditions.engagement, conditions.axial_depth, conditions.feed_per_tooth)
     weight = rows.width * (rows.end - rows.start) * _mean_chip(rows)

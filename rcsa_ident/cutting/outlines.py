@@ -25,28 +25,16 @@ _SHARP = 1e-6
 class Dimensions(Shown):
     """What draws a cutter's shape beside its diameter and its corner radius; None is not told.
 
-    Parameters
-    ----------
-    cutting_edge_angle : float or None [rad]
-        KAPR, from the floor to the edge.
-    taper : float or None [rad]
-        From the axis to the edge; of a dovetail towards the shank, of a tapered barrel where its arc stands at `axial_distance`.
-    largest_diameter : float or None [m]
-        DCX, where the edge ends.
-    cutting_depth : float or None [m]
-        APMX, from the tip to where the edge ends.
-    wiper : float or None [m]
-        BS, length of the flat beside the corner.
-    profile_radius : float or None [m]
-        PRFRAD, of the long arc.
-    axial_distance : float or None [m]
-        From the tip to where a barrel is widest, or a tapered one leans by its taper.
-    upper_radius : float or None [m]
-        Of the arc between a barrel and its upper end, which lies at the cutting depth.
-    tip_diameter, neck_diameter : float or None [m]
-        Of the floor, and of what carries a lollipop.
-    tip_length : float or None [m]
-        Of the straight edge below a hollow radius.
+    `cutting_edge_angle` [rad]: KAPR, from the floor to the edge
+    `taper` [rad]: from the axis to the edge; of a dovetail towards the shank, of a tapered barrel where its arc stands at `axial_distance`
+    `largest_diameter` [m]: DCX, where the edge ends
+    `cutting_depth` [m]: APMX, from the tip to where the edge ends
+    `wiper` [m]: BS, length of the flat beside the corner
+    `profile_radius` [m]: PRFRAD, of the long arc
+    `axial_distance` [m]: from the tip to where a barrel is widest, or a tapered one leans by its taper
+    `upper_radius` [m]: of the arc between a barrel and its upper end, which lies at the cutting depth
+    `tip_diameter`, `neck_diameter` [m]: of the floor, and of what carries a lollipop
+    `tip_length` [m]: of the straight edge below a hollow radius
     """
 
     cutting_edge_angle: float | None = None
@@ -136,16 +124,8 @@ def missing(shape: CutterShape, corner_radius: float, dimensions: Dimensions) ->
 def outline_of(shape: CutterShape, diameter: float, corner_radius: float, dimensions: Dimensions) -> Profile | None:
     """Return the outline of a shape; None of a plain cylinder, and of a shape of which too little is told.
 
-    Parameters
-    ----------
-    shape : CutterShape
-    diameter, corner_radius : float [m]
-    dimensions : Dimensions
-
-    Raises
-    ------
-    InputError
-        If no cutter can have them.
+    `diameter`, `corner_radius` [m]
+    Raises `InputError` if no cutter can have them.
 
     Examples
     --------

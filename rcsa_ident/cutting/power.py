@@ -23,11 +23,7 @@ from rcsa_ident.cutting.rows import rows_of
 class SpindleLoad:
     """What a cut takes from the spindle, as means over a revolution.
 
-    Parameters
-    ----------
-    torque : float [N m]
-    power : float [W]
-    removal_rate : float [m^3/s]
+    `torque` [N m]; `power` [W]; `removal_rate` [m^3/s]
     """
 
     torque: float
@@ -48,12 +44,7 @@ def spindle_load(cutter: Cutter, conditions: CuttingConditions, coefficients: Cu
     shape; of a wall V = N c a a_e with the feed per tooth c, and W = N a (phi_exit - phi_entry) D / 2. Pitch, helix and, for the chips'
     part, run-out change none of it.
 
-    Parameters
-    ----------
-    cutter : Cutter
-        Its run-out is left aside.
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
+    `cutter`: its run-out is left aside
     """
     volume, rubbed = _in_a_turn(cutter, conditions)
     torque = (coefficients.tangential * volume + coefficients.tangential_edge * rubbed) / (2.0 * np.pi)

@@ -20,10 +20,7 @@ _LONG = 10.0
 class Profile(Shown):
     """The outline that a cutter's edges sweep over, from the tip up.
 
-    Parameters
-    ----------
-    segments : tuple of Line and Arc
-        Each begins where the one before it ends; heights never fall, and the first one begins at the tip, z = 0.
+    `segments`: each begins where the one before it ends; heights never fall, and the first one begins at the tip, z = 0
 
     Examples
     --------
@@ -85,11 +82,8 @@ class Profile(Shown):
 
         Floors are left out: nothing of them is cut by a tool that is fed sideways.
 
-        Parameters
-        ----------
-        depth : float [m]
-        radii, heights : tuples of float [m]
-            Where something about the cut changes.
+        `depth` [m]
+        `radii`, `heights`: tuples of float [m], where something about the cut changes
         """
         found = []
         for segment in self.segments:
@@ -156,10 +150,7 @@ class Profile(Shown):
     def tapered(cls, diameter: float, taper: float, corner_radius: float = 0.0, length: float | None = None) -> Profile:
         """Return the outline of a cutter that widens by `taper` [rad] on each side above its corner.
 
-        Parameters
-        ----------
-        diameter : float [m]
-            At the tip; with a corner radius twice the radius of its arc's outermost point, as of a bull nose.
+        `diameter` [m]: at the tip; with a corner radius twice the radius of its arc's outermost point, as of a bull nose
         """
         r, high = 0.5 * positive("diameter", diameter, "m"), _length(diameter, length)
         _corner(corner_radius, r)
@@ -174,16 +165,10 @@ class Profile(Shown):
     def face(cls, diameter: float, cutting_edge_angle: float, depth: float, corner_radius: float = 0.0) -> Profile:
         """Return the outline of a cutter with a lead angle: face, high-feed and, beyond 90 degrees, dovetail mills.
 
-        Parameters
-        ----------
-        diameter : float [m]
-            Where the edge's line meets the floor.
-        cutting_edge_angle : float [rad]
-            KAPR, from the floor to the edge.
-        depth : float [m]
-            Height to which the edge reaches, APMX.
-        corner_radius : float [m]
-            Between floor and edge, RE.
+        `diameter` [m]: where the edge's line meets the floor
+        `cutting_edge_angle` [rad]: KAPR, from the floor to the edge
+        `depth` [m]: height to which the edge reaches, APMX
+        `corner_radius` [m]: between floor and edge, RE
         """
         r, kappa = 0.5 * positive("diameter", diameter, "m"), cutting_edge_angle
         if not 0.0 < kappa < np.pi:
@@ -235,14 +220,10 @@ class Profile(Shown):
     ) -> Profile:
         """Return the outline of a barrel: an arc with its largest diameter at a height, above a corner that it touches.
 
-        Parameters
-        ----------
-        diameter, profile_radius : float [m]
-            The largest diameter, and the radius of the arc there.
-        height, length : float [m]
-            Where it is widest, and where the edge ends.
-        corner_radius, upper_radius : float [m]
-            Of the arcs between floor and barrel, and between barrel and the edge's upper end; without the latter it ends sharp.
+        `diameter`, `profile_radius` [m]: the largest diameter, and the radius of the arc there
+        `height`, `length` [m]: where it is widest, and where the edge ends
+        `corner_radius`, `upper_radius` [m]: of the arcs between floor and barrel, and between barrel and the edge's upper end; without the
+            latter it ends sharp
         """
         r, big = 0.5 * positive("diameter", diameter, "m"), positive("profile_radius", profile_radius, "m")
         between = big - corner_radius
@@ -295,17 +276,11 @@ class Profile(Shown):
     ) -> Profile:
         """Return the outline of a tapered barrel: an arc that touches the tip's and leans by `taper` at a height.
 
-        Parameters
-        ----------
-        profile_radius, tip_radius : float [m]
-            Of the arcs of flank and tip.
-        taper : float [rad]
-        height, length : float [m]
-            Where the flank leans so, and where the edge ends.
-        tip_diameter : float or None [m]
-            Twice the radius of the tip's arc, were it to go on to a wall; None is a ball.
-        upper_radius : float [m]
-            Of the arc between the flank and the edge's upper end; without it the edge ends sharp.
+        `profile_radius`, `tip_radius` [m]: of the arcs of flank and tip
+        `taper` [rad]
+        `height`, `length` [m]: where the flank leans so, and where the edge ends
+        `tip_diameter` [m]: twice the radius of the tip's arc, were it to go on to a wall; None is a ball
+        `upper_radius` [m]: of the arc between the flank and the edge's upper end; without it the edge ends sharp
         """
         big, ball = positive("profile_radius", profile_radius, "m"), positive("tip_radius", tip_radius, "m")
         if not ball < big:
@@ -327,16 +302,10 @@ class Profile(Shown):
     def seven(cls, d: float, r: float, r_r: float, r_z: float, alpha: float, beta: float, h: float) -> Profile:
         """Return the outline of the general cutter with seven parameters of APT [engin2001].
 
-        Parameters
-        ----------
-        d : float [m]
-            Cutter diameter.
-        r, r_r, r_z : float [m]
-            Corner radius, and radial and axial place of its centre.
-        alpha, beta : float [rad]
-            Of the tip's cone from the floor, and of the flank from the axis.
-        h : float [m]
-            Cutter height.
+        `d` [m]: cutter diameter
+        `r`, `r_r`, `r_z` [m]: corner radius, and radial and axial place of its centre
+        `alpha`, `beta` [rad]: of the tip's cone from the floor, and of the flank from the axis
+        `h` [m]: cutter height
         """
         positive("d", d, "m")
         if r <= 0.0:

@@ -30,26 +30,16 @@ _UPRIGHT = 1e-12
 class Rows:
     """Pieces of edge in the cut, arrays of shape (n,).
 
-    Parameters
-    ----------
-    angle : [rad]
-        Of the tooth ahead of tooth 1, at its tip.
-    near, far : [rad]
-        Between which lags behind its tip the piece stands; the same where it is a point.
-    start, end : [rad]
-        Immersion angles between which it cuts.
-    delay : [rad]
-        Rotation since the surface that it cuts was made.
-    feed, step : [m]
-        The chip, measured radially, is feed sin(phi) + step.
-    z, r : [m]
-        Height above the tip, and radius.
-    kappa : [rad]
-        Angle of the edge's outward normal, from the axis pointing down.
-    width : [m]
-        Along the edge, in the plane of axis and radius.
-    spacing : float [rad]
-        Rotation after which the next tooth stands as these do: a pitch where all teeth are alike and only one has rows, else a turn.
+    `angle` [rad]: of the tooth ahead of tooth 1, at its tip
+    `near`, `far` [rad]: between which lags behind its tip the piece stands; the same where it is a point
+    `start`, `end` [rad]: immersion angles between which it cuts
+    `delay` [rad]: rotation since the surface that it cuts was made
+    `feed`, `step` [m]: the chip, measured radially, is feed sin(phi) + step
+    `z`, `r` [m]: height above the tip, and radius
+    `kappa` [rad]: angle of the edge's outward normal, from the axis pointing down
+    `width` [m]: along the edge, in the plane of axis and radius
+    `spacing` [rad]: rotation after which the next tooth stands as these do: a pitch where all teeth are alike and only one has rows, else a
+        turn
     """
 
     angle: FloatArray
@@ -86,22 +76,11 @@ def rows_of(
 ) -> Rows:
     """Return what of which tooth cuts, down to a depth; no rows where none of them reaches the material.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    engagement : Engagement, Block, Stepover or EngagementMap
-    depth : float [m]
-    feed_per_tooth : float or None [m]
-        Decides where teeth are offset from each other; else it scales the chip only, and None counts as 1.
-    along : bool
-        Whether where a piece stands along the edge matters, as it does to the tip's slopes: walls are nodes then, too.
-    nodes : int
-        Of a curved piece of the outline, at least.
-
-    Raises
-    ------
-    InputError
-        If the depth is beyond the edge, teeth meet, or teeth are offset and no feed is told.
+    `depth` [m]
+    `feed_per_tooth` [m]: decides where teeth are offset from each other; else it scales the chip only, and None counts as 1
+    `along`: whether where a piece stands along the edge matters, as it does to the tip's slopes: walls are nodes then, too
+    `nodes`: of a curved piece of the outline, at least
+    Raises `InputError` if the depth is beyond the edge, teeth meet, or teeth are offset and no feed is told.
     """
     rise = engagement.feed_rise if isinstance(engagement, EngagementMap) else 0.0
     if cutter.offset and feed_per_tooth is None:
@@ -149,15 +128,9 @@ def _of_cylinder(cutter: Cutter, engagement: Engagement, depth: float, feed: flo
 class Places(NamedTuple):
     """Places along a piece of a cutter's outline that stands in the cut, arrays of shape (n,), and where the teeth's edges are there.
 
-    Parameters
-    ----------
-    z, r, kappa, width
-        As of `Rows`.
-    edges : Edges
-    span : array, shape (teeth, n) [rad]
-        Half of the lag between the ends of what a place stands for; 0 where it is a point.
-    arcs : array, shape (k, n, 2) [rad]
-        Between which angles it cuts.
+    `z`, `r`, `kappa`, `width`: as of `Rows`
+    `span` [rad], shape (teeth, n): half of the lag between the ends of what a place stands for; 0 where it is a point
+    `arcs` [rad], shape (k, n, 2): between which angles it cuts
     """
 
     z: FloatArray
@@ -172,13 +145,7 @@ class Places(NamedTuple):
 def places_of(
     cutter: Cutter, engagement: AnyEngagement, depth: float, along: bool = False, nodes: int = NODES, wave: int = WAVE
 ) -> list[Places]:
-    """Return places along the outline down to a depth, piece by piece; see `rows_of`.
-
-    Parameters
-    ----------
-    wave : int
-        Nodes of a wave of a serrated edge.
-    """
+    """Return places along the outline down to a depth, piece by piece; see `rows_of`. `wave`: nodes of a wave of a serrated edge."""
     outline = cutter.outline
     if depth > outline.height * (1.0 + 1e-9):
         raise InputError("depth", f"{1e3 * depth:g} mm", f"at most {1e3 * outline.height:g} mm, where the cutter's edge ends")

@@ -19,13 +19,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Line(Shown):
-    """A straight piece of the outline.
-
-    Parameters
-    ----------
-    r0, z0, r1, z1 : float [m]
-        Where it begins and ends; z1 is not below z0.
-    """
+    """A straight piece of the outline. `r0`, `z0`, `r1`, `z1` [m]: where it begins and ends; z1 is not below z0."""
 
     r0: float
     z0: float
@@ -76,14 +70,9 @@ class Line(Shown):
 class Arc(Shown):
     """A piece of a circle: r = r_c + radius sin kappa, z = z_c - radius cos kappa.
 
-    Parameters
-    ----------
-    r_c, z_c : float [m]
-        Its centre.
-    radius : float [m]
-        Below zero where the outline is hollow there.
-    kappa0, kappa1 : float [rad]
-        Where it begins and ends, 0 to pi; ascending, or descending where it is hollow.
+    `r_c`, `z_c` [m]: its centre
+    `radius` [m]: below zero where the outline is hollow there
+    `kappa0`, `kappa1` [rad]: where it begins and ends, 0 to pi; ascending, or descending where it is hollow
     """
 
     r_c: float

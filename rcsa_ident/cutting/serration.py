@@ -25,18 +25,13 @@ class WaveShape(StrEnum):
 class Serration(Shown):
     """A wave along each tooth's edge.
 
-    Parameters
-    ----------
-    amplitude : float [m]
-        From the middle to a crest.
-    wavelength : float [m]
-        Along the axis.
-    shape : WaveShape or its name, default sine
-        Arcs of circles that meet in the middle, or flats of a quarter of the wavelength with flanks as long between them.
-    shift : array, shape (teeth,) [-], or None
-        By which share of the wavelength each tooth's wave is moved towards the tip; None moves tooth j by j over their number.
-    table : array, shape (n,) [-], or None
-        Offset over the amplitude at n equal steps of a wavelength, for the shape `table`; straight lines between them.
+    `amplitude` [m]: from the middle to a crest
+    `wavelength` [m]: along the axis
+    `shape`: WaveShape or its name, default sine; arcs of circles that meet in the middle, or flats of a quarter of the wavelength with
+        flanks as long between them
+    `shift` [-], shape (teeth,): by which share of the wavelength each tooth's wave is moved towards the tip; None moves tooth j by j over
+        their number
+    `table` [-], shape (n,): offset over the amplitude at n equal steps of a wavelength, for the shape `table`; straight lines between them
 
     Examples
     --------

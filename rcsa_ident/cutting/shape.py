@@ -58,14 +58,9 @@ _OF_LIMITS = {
 def cylinder_remark(shape: CutterShape, forces: bool = False, missing: Sequence[str] = ()) -> Remark:
     """Return what to make of an answer that took a cutter of this shape for a cylinder of its diameter.
 
-    Parameters
-    ----------
-    shape : CutterShape
-        The range is that of this shape; a cylinder with a noticeable corner radius has that of a bull nose.
-    forces : bool
-        Whether the answer was found from cutting forces.
-    missing : sequence of str
-        Keys of the cutter that nobody told, without which its shape cannot be drawn.
+    `shape`: the range is that of this shape; a cylinder with a noticeable corner radius has that of a bull nose
+    `forces`: whether the answer was found from cutting forces
+    `missing`: keys of the cutter that nobody told, without which its shape cannot be drawn
     """
     known = _OF_LIMITS.get(CutterShape.BULL_NOSE if shape is CutterShape.FLAT else shape)
     what = "the corner radius is more than a tenth of the depth" if shape is CutterShape.FLAT else f"the cutter's shape is {shape}"

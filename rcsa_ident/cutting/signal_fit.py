@@ -33,14 +33,9 @@ _SENSOR_PRIOR = 1.0
 class Dynamometer:
     """What is not known of the force sensor.
 
-    Parameters
-    ----------
-    order : int
-        0: it follows the force; 1: first-order low-pass per axis; 2: one resonance per axis.
-    frequency : float [Hz]
-        Bandwidth or natural frequency to start from.
-    damping : float
-        Damping ratio to start from, with order 2.
+    `order`: 0: it follows the force; 1: first-order low-pass per axis; 2: one resonance per axis
+    `frequency` [Hz]: bandwidth or natural frequency to start from
+    `damping`: damping ratio to start from, with order 2
     """
 
     order: int = 0
@@ -61,18 +56,12 @@ class Dynamometer:
 class SignalCalibration:
     """Coefficients with what was found beside them.
 
-    Parameters
-    ----------
-    forces : ForceCalibration
-    runout : dict of clamping to array, shape (teeth,) [m]
-    helix : float or None [rad]
-        The helix angle found, where it was an unknown.
-    angle : array, shape (k,) [rad]
-        Immersion of tooth 1 at each record's start, up to the pitch where teeth are alike.
-    sensor : array, shape (2, order)
-        Frequency [Hz] and damping per axis.
-    noise_half_width, cut_half_width : arrays, shape (4,)
-        95 % by what scatters within records, and by what scatters between cuts (infinite where they are too few).
+    `runout`: dict of clamping to array, shape (teeth,) [m]
+    `helix` [rad]: the helix angle found, where it was an unknown
+    `angle` [rad], shape (k,): immersion of tooth 1 at each record's start, up to the pitch where teeth are alike
+    `sensor`, shape (2, order): frequency [Hz] and damping per axis
+    `noise_half_width`, `cut_half_width`, shape (4,): 95 % by what scatters within records, and by what scatters between cuts (infinite
+        where they are too few)
     """
 
     forces: ForceCalibration

@@ -16,12 +16,8 @@ from rcsa_ident.cutting.cutter import Cutter
 class Immersion(Shown):
     """A radial immersion, asked for before the cutter is known.
 
-    Parameters
-    ----------
-    share : float
-        Radial depth over the cutter's diameter, above 0 and not above 1, which is a slot.
-    strategy : str
-        ``up`` or ``down``.
+    `share`: radial depth over the cutter's diameter, above 0 and not above 1, which is a slot
+    `strategy`: ``up`` or ``down``
     """
 
     share: float
@@ -44,15 +40,7 @@ def engagement_with(asked: AskedEngagement, cutter: Cutter) -> AnyEngagement:
     A cylinder is engaged alike at all heights, and so is every cutter in a slot. Another shape is as wide as its outline at each height:
     an immersion is the stepover that it is at its diameter.
 
-    Parameters
-    ----------
-    asked : Engagement, Block, Stepover, EngagementMap or Immersion
-    cutter : Cutter
-
-    Raises
-    ------
-    InputError
-        If the cutter does not reach the stock.
+    Raises `InputError` if the cutter does not reach the stock.
 
     Examples
     --------
@@ -82,10 +70,7 @@ def engagement_with(asked: AskedEngagement, cutter: Cutter) -> AnyEngagement:
 def engagement_between(entry: float, leave: float, cutter: Cutter) -> AnyEngagement:
     """Return how a cutter is engaged that cuts between two angles at its diameter: up and down milling of a shape is a stepover.
 
-    Parameters
-    ----------
-    entry, leave : float [rad]
-    cutter : Cutter
+    `entry`, `leave` [rad]
     """
     up, down = entry <= 1e-9, leave >= np.pi - 1e-9
     if cutter.profile is None or up == down:
@@ -97,12 +82,7 @@ def engagement_between(entry: float, leave: float, cutter: Cutter) -> AnyEngagem
 def check_cut(cutter: Cutter, engagement: AnyEngagement, depth: float, feed_per_tooth: float | None) -> None:
     """Refuse a cut that a cutter cannot make: deeper than its edge, with teeth that meet, or where none of them cuts.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    engagement : Engagement, Block, Stepover or EngagementMap
-    depth : float [m]
-    feed_per_tooth : float or None [m]
+    `depth` [m]; `feed_per_tooth` [m]
     """
     if cutter.is_cylinder and isinstance(engagement, Engagement):
         return

@@ -22,16 +22,10 @@ _ROUNDING, _HEIGHTS = 1e-6, 4001
 class Edges(NamedTuple):
     """The teeth's edges at n places along the outline.
 
-    Parameters
-    ----------
-    lag : array, shape (teeth, n) [rad]
-        By which each edge lags its own tip.
-    pitch : array, shape (teeth, n) [rad]
-        From each tooth to the one ahead of it.
-    offset : array, shape (teeth, n) [m]
-        Radial, of each edge from the outline.
-    slope : array, shape (teeth, n) [-]
-        Of the serration, over the height.
+    `lag` [rad], shape (teeth, n): by which each edge lags its own tip
+    `pitch` [rad], shape (teeth, n): from each tooth to the one ahead of it
+    `offset` [m], shape (teeth, n): radial, of each edge from the outline
+    `slope` [-], shape (teeth, n): of the serration, over the height
     """
 
     lag: FloatArray
@@ -43,10 +37,7 @@ class Edges(NamedTuple):
 def edges_at(cutter: Cutter, z: FloatArray, kappa: FloatArray) -> Edges:
     """Return where the teeth's edges stand at heights z [m] of the outline, whose normals have the angles kappa [rad].
 
-    Raises
-    ------
-    InputError
-        If the teeth meet below the highest place.
+    Raises `InputError` if the teeth meet below the highest place.
     """
     lag = lags(cutter, z)
     pitch = cutter.pitch[:, None] + lag - np.roll(lag, -1, axis=0)
@@ -71,16 +62,10 @@ def edges_at(cutter: Cutter, z: FloatArray, kappa: FloatArray) -> Edges:
 class Slices(NamedTuple):
     """A cut's edges in slices across the axis, from the tip up.
 
-    Parameters
-    ----------
-    radius, height : arrays, shape (n,) [m]
-        Of the outline in the middle of each slice.
-    lag, pitch, offset : arrays, shape (teeth, n) [rad, rad, m]
-        As in `Edges`.
-    lean : array, shape (teeth, n) [rad]
-        Of the edge's outward normal from the axis pointing down, waves included: pi/2 on a wall.
-    width : array, shape (teeth, n) [m]
-        Of edge in each slice.
+    `radius`, `height` [m], shape (n,): of the outline in the middle of each slice
+    `lag`, `pitch`, `offset` [rad, rad, m], shape (teeth, n): as in `Edges`
+    `lean` [rad], shape (teeth, n): of the edge's outward normal from the axis pointing down, waves included: pi/2 on a wall
+    `width` [m], shape (teeth, n): of edge in each slice
     """
 
     radius: FloatArray
@@ -95,14 +80,9 @@ class Slices(NamedTuple):
 def slices_of(cutter: Cutter, depth: float, count: int, radii: tuple[float, ...] = (), heights: tuple[float, ...] = ()) -> Slices:
     """Return a cut's slices.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    depth : float [m]
-    count : int
-        Slices, at least: each piece of the outline has its share.
-    radii, heights : tuples of float [m]
-        Where something about the cut changes: no slice lies on both sides.
+    `depth` [m]
+    `count`: slices, at least: each piece of the outline has its share
+    `radii`, `heights`: tuples of float [m], where something about the cut changes: no slice lies on both sides
 
     Examples
     --------

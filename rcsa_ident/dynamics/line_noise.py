@@ -20,12 +20,8 @@ def differences_noise(values: ComplexArray, stride: int = 1) -> FloatArray:
     A third difference of white noise has 20 times its variance, and the median of |z|^2 is ln 2 of its mean. The median is that of a
     window of lines, so that a resonance does not count as noise.
 
-    Parameters
-    ----------
-    values : complex array, shape (n, ...)
-        Along neighbouring lines, more than three times the stride.
-    stride : int
-        Lines from one value of a difference to the next.
+    `values`, shape (n, ...): along neighbouring lines, more than three times the stride
+    `stride`: lines from one value of a difference to the next
     """
     n, reach = len(values), 3 * stride
     third = values[reach:] - 3.0 * values[2 * stride : n - stride] + 3.0 * values[stride : n - 2 * stride] - values[: n - reach]
@@ -41,10 +37,7 @@ def line_noise(values: ComplexArray) -> FloatArray:
     Lines that a window has smeared into each other differ less than their noise: where further ones differ more, these count. Where
     differences grow as a curve's do, as at a sharp resonance, the noise is that of the lines beside it.
 
-    Parameters
-    ----------
-    values : complex array, shape (n, ...)
-        Along neighbouring lines; fewer than four windows of them show no noise.
+    `values`, shape (n, ...): along neighbouring lines; fewer than four windows of them show no noise
 
     Examples
     --------

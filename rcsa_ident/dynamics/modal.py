@@ -202,16 +202,11 @@ def damped_modes(
     Solves q'' + D q' + diag(omega_n^2) q = psi f, w = psi^T q, exactly; a real pole becomes a mode with zeta = 1 and
     half its residue, so that the pair of poles sums to it.
 
-    Parameters
-    ----------
-    omega_n : array, shape (m,) [rad/s]
-    damping : array, shape (m, m) [rad/s]
-        Symmetric positive semidefinite.
-    psi : array, shape (m, d) [1/sqrt(kg), 1/sqrt(kg m^2)]
-        Mass-normalised shapes.
-    residual : array, shape (d, d) [m/N, rad/N, m/(N m), rad/(N m)]
-        Static compliance of the modes above the band.
-    coordinates : tuple of Coordinate, length d
+    `omega_n` [rad/s], shape (m,)
+    `damping` [rad/s], shape (m, m): symmetric positive semidefinite
+    `psi` [1/sqrt(kg), 1/sqrt(kg m^2)], shape (m, d): mass-normalised shapes
+    `residual` [m/N, rad/N, m/(N m), rad/(N m)], shape (d, d): static compliance of the modes above the band
+    `coordinates`: tuple of Coordinate, length d
     """
     values, q, norm = _free_motions(omega_n, damping)
     # where a pair of poles is about to become real it has no two shapes: a few millionths more damping tell it apart

@@ -89,18 +89,11 @@ _EXPLAINS = {
 class _Look(NamedTuple):
     """How an FRF looks.
 
-    Parameters
-    ----------
-    wrong : float
-        Share of the power's square that a driving point would give back.
-    turns : float
-        From -1, clockwise throughout, to 1.
-    worst : float
-        Frequency of the largest power that is given back, in the unit of the frequencies.
-    left : float
-        The largest power that is given back over the largest one that is taken up.
-    springs : bool
-        Off its resonances the real part is the larger one, as of every structure that is not overdamped.
+    `wrong`: share of the power's square that a driving point would give back
+    `turns`: from -1, clockwise throughout, to 1
+    `worst`: frequency of the largest power that is given back, in the unit of the frequencies
+    `left`: the largest power that is given back over the largest one that is taken up
+    `springs`: off its resonances the real part is the larger one, as of every structure that is not overdamped
     """
 
     wrong: float
@@ -127,17 +120,10 @@ def judged(
 ) -> tuple[ComplexArray, tuple[Remark, ...]]:
     """Return a measured receptance, turned where that was asked for or is certain, and what is to be said of it.
 
-    Parameters
-    ----------
-    frequency : array, shape (n,) [Hz]
-    values : complex array, shape (n,) [m/N]
-    correction : Correction
-    driving : bool
-        Response and force are one point and one direction.
-    unit_told : bool
-        Whether the file or the user says that it is a receptance.
-    band : (float, float) [Hz]
-        Lines that are looked at.
+    `frequency` [Hz], shape (n,); `values` [m/N], shape (n,)
+    `driving`: response and force are one point and one direction
+    `unit_told`: whether the file or the user says that it is a receptance
+    `band`: (float, float) [Hz]; lines that are looked at
 
     Examples
     --------
@@ -177,12 +163,9 @@ def judged(
 def reciprocal(frequency: FloatArray, one: ComplexArray, other: ComplexArray, names: Sequence[str]) -> tuple[Remark, ...]:
     """Return what is to be said of two cross FRFs that reciprocity makes one.
 
-    Parameters
-    ----------
-    frequency : array, shape (n,) [Hz]
-    one, other : complex array, shape (n,)
-        Response and force exchanged.
-    names : (str, str)
+    `frequency` [Hz], shape (n,)
+    `one`, `other`, shape (n,): response and force exchanged
+    `names`: (str, str)
     """
     a, b = frequency**2 * one, frequency**2 * other
     size = 0.5 * (np.linalg.norm(a) + np.linalg.norm(b))

@@ -146,11 +146,7 @@ def pole_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> Co
 def pair_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> ComplexArray:
     """Return sum_k residue_k / (i omega - pole_k) + conj(residue_k) / (i omega - conj(pole_k)), shape (n, r, c).
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-    pole : complex array, shape (m,) [rad/s]
-    residue : complex array, shape (m, r, c)
+    `omega` [rad/s], shape (n,); `pole` [rad/s], shape (m,); `residue`, shape (m, r, c)
     """
     m, r, c = residue.shape
     flat = residue.reshape(m, r * c)

@@ -37,21 +37,13 @@ class FitStatus(StrEnum):
 class RationalFit:
     """A stable rational function with real coefficients: common poles, a residue matrix for each.
 
-    Parameters
-    ----------
-    pole : complex array, shape (m,) [rad/s]
-        Imaginary parts not negative, real parts negative.
-    residue : complex array, shape (m, r, c)
-        In H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real pole's is half.
-    constant : array, shape (r, c)
-        Residual compliance; 0 where the fit is strictly proper.
-    error : float [-]
-        Root mean square of the weighted misfit: relative where no noise was given, else in standard deviations.
-    relative_error : float [-]
-        Norm of the misfit over norm of the values, the worst entry's.
-    order : int
-        Number of poles, both of each pair counted: the degree of the denominator.
-    status : FitStatus
+    `pole` [rad/s], shape (m,): imaginary parts not negative, real parts negative
+    `residue`, shape (m, r, c): in H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real
+        pole's is half
+    `constant`, shape (r, c): residual compliance; 0 where the fit is strictly proper
+    `error` [-]: root mean square of the weighted misfit: relative where no noise was given, else in standard deviations
+    `relative_error` [-]: norm of the misfit over norm of the values, the worst entry's
+    `order`: number of poles, both of each pair counted: the degree of the denominator
     """
 
     pole: ComplexArray
@@ -73,11 +65,8 @@ class RationalFit:
     def modes(self, rank: float = _RANK) -> PoleResidue:
         """Return the function with each residue as a sum of rank-one parts, by singular values.
 
-        Parameters
-        ----------
-        rank : float
-            Share of a residue's largest singular value below which a part is dropped; 1 keeps a single shape for each pole, as a
-            structure's modes have.
+        `rank`: share of a residue's largest singular value below which a part is dropped; 1 keeps a single shape for each pole, as a
+            structure's modes have
         """
         parts = []
         for pole, residue in zip(self.pole, self.residue, strict=True):
@@ -181,24 +170,13 @@ def fitted_poles(
 ) -> tuple[PoleResidue, float]:
     """Return the poles of a square receptance, and the norm of what is left as a share; planes that do not couple keep their own poles.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-        Others than those above 0 are left aside.
-    values : complex array, shape (n, r, r)
-        Directions that do not couple, directly or through others, are fitted apart; one that is rigid has no poles.
-    tolerance : float
-        As in `rational_fit`.
-    damped_outside : float
-        Least damping ratio of poles outside the band: they stand for many modes and are nobody's. Above 0, the constant stands for
-        poles far above the band, which would ask whoever marches through time for steps of their own length.
-    noise : array, shape (n, r, r), optional
-        As in `rational_fit`.
-
-    Raises
-    ------
-    InputError
-        If the receptance is zero at every frequency.
+    `omega` [rad/s], shape (n,): others than those above 0 are left aside
+    `values`, shape (n, r, r): directions that do not couple, directly or through others, are fitted apart; one that is rigid has no poles
+    `tolerance`: as in `rational_fit`
+    `damped_outside`: least damping ratio of poles outside the band: they stand for many modes and are nobody's. Above 0, the constant
+        stands for poles far above the band, which would ask whoever marches through time for steps of their own length.
+    `noise`, shape (n, r, r): as in `rational_fit`
+    Raises `InputError` if the receptance is zero at every frequency.
     """
     above = omega > 0.0
     omega, values = omega[above], values[above]
@@ -256,17 +234,11 @@ def common_poles(
 ) -> ComplexArray:
     """Return the poles that fit several functions best, by vector fitting from poles that are nearly theirs.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-        Above 0.
-    values : complex array, shape (d, n, e)
-        Functions of e entries each.
-    start : complex array, shape (m,) [rad/s]
-    allowed : array, shape (n, e)
-        What a fit may be beside each of them.
-    damped_outside : float
-        As in `fitted_poles`, of poles whose flank is not seen.
+    `omega` [rad/s], shape (n,): above 0
+    `values`, shape (d, n, e): functions of e entries each
+    `start` [rad/s], shape (m,)
+    `allowed`, shape (n, e): what a fit may be beside each of them
+    `damped_outside`: as in `fitted_poles`, of poles whose flank is not seen
     """
     beside = np.moveaxis(values, 0, 1).reshape(omega.size, -1)
     problem = Problem.of(omega, beside, 1.0, np.tile(allowed, len(values)), None, True)
@@ -291,13 +263,9 @@ def shared_residues(
 ) -> tuple[list[PoleResidue], float]:
     """Return functions that share their poles, each with residues of its own, and the largest share that is left of one of them.
 
-    Parameters
-    ----------
-    omega, allowed, pole
-        As in `common_poles`.
-    values : complex array, shape (d, n, e)
-    shape : (int, int)
-        Rows and columns that the e entries of a function stand for.
+    `omega`, `allowed`, `pole`: as in `common_poles`
+    `values`, shape (d, n, e)
+    `shape`: (int, int); rows and columns that the e entries of a function stand for
     """
     residue, constant = _residues(omega, values, 1.0 / allowed, pole)
     fits = [

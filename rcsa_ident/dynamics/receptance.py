@@ -18,11 +18,8 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 class MeasuredCurve(tuple[FloatArray, ComplexArray]):
     """Frequencies [Hz] and receptance [m/N] of one FRF, shape (n,) both, that also says what its reader assumed.
 
-    Parameters
-    ----------
-    frequency : array, shape (n,) [Hz]
-    values : complex array, shape (n,) [m/N]
-    remarks : tuple of Remark
+    `frequency`: array, shape (n,) [Hz]
+    `values`: complex array, shape (n,) [m/N]
     """
 
     remarks: tuple[Remark, ...]
@@ -202,11 +199,8 @@ def dissipation(omega: FloatArray, values: ComplexArray) -> FloatArray:
     A structure without an inner source of energy has none below zero: the mean power that a harmonic force f feeds
     in is f^H (Y + Y^H) f / 4 with the mobility Y = i omega H.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-    values : complex array, shape (n, d, d)
-        A square receptance, rows as columns.
+    `omega` [rad/s], shape (n,)
+    `values`, shape (n, d, d): a square receptance, rows as columns
     """
     mobility = 1j * omega[:, None, None] * values
     hermitian = 0.5 * (mobility + np.conj(np.swapaxes(mobility, 1, 2)))

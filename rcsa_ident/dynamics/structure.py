@@ -20,15 +20,11 @@ from rcsa_ident.dynamics.receptance import Receptance
 class Structure:
     """A linear structure, M q'' + C q' + (K + i S) q = f.
 
-    Parameters
-    ----------
-    mass, damping, stiffness, structural_damping : arrays, shape (d, d)
-        SI; `structural_damping` S is the imaginary part of the stiffness (material loss factors, hysteretic).
-    coordinates : tuple of Coordinate, length p
-    index : array of int, shape (p,)
-        The degree of freedom that each coordinate is; empty where `shapes` are given.
-    shapes : array, shape (d, p), optional
-        How each coordinate moves with every degree of freedom, where coordinates are none of these themselves.
+    `mass`, `damping`, `stiffness`, `structural_damping`, shape (d, d): SI; `structural_damping` S is the imaginary part of the stiffness
+        (material loss factors, hysteretic)
+    `coordinates`: tuple of Coordinate, length p
+    `index`: array of int, shape (p,); the degree of freedom that each coordinate is; empty where `shapes` are given
+    `shapes`, shape (d, p): how each coordinate moves with every degree of freedom, where coordinates are none of these themselves
     """
 
     mass: FloatArray
@@ -126,11 +122,7 @@ def natural_frequencies(structure: Structure) -> FloatArray:
 def rigid_body_modes(structure: Structure, max_omega: float) -> FloatArray:
     """Return the mass-orthonormal motions that no spring, damper or loss factor feels, shape (d, k), k = 0 if there are none.
 
-    Parameters
-    ----------
-    structure : Structure
-    max_omega : float [rad/s]
-        A frequency of the elastic motion; a thousandth of it shifts the inverse iteration.
+    `max_omega` [rad/s]: a frequency of the elastic motion; a thousandth of it shifts the inverse iteration
     """
     return _rigid_body_modes(_Bands.of(structure), max_omega)
 
@@ -161,14 +153,9 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
     off before: their double pole at zero has no diagonal form, and stands as a pair at a ten-millionth of `max_omega`.
     `tests/dynamics` holds the result against the full solution: 1e-6 of each entry at every frequency.
 
-    Parameters
-    ----------
-    structure : Structure
-    max_omega : float [rad/s]
-    snapshots : int
-        Frequencies at which the full equations are solved, Chebyshev points of the band.
-    tolerance : float
-        Directions whose share of the solutions is smaller are dropped.
+    `max_omega` [rad/s]
+    `snapshots`: frequencies at which the full equations are solved, Chebyshev points of the band
+    `tolerance`: directions whose share of the solutions is smaller are dropped
     """
     bands = _Bands.of(structure)
     rigid = _rigid_body_modes(bands, max_omega)
@@ -190,16 +177,10 @@ def projection_basis(
 ) -> FloatArray:
     """Return the undamped modes within what `poles` projects on, for equations that moments across the velocity join; shape (d, k).
 
-    Parameters
-    ----------
-    structure : Structure
-    rigid : array, shape (d, r)
-        Its rigid-body motions, mass-orthonormal, as the basis is; both are orthogonal to each other.
-    moments : sequence of arrays, shape (d, d)
-        Symmetric, within the bands of the mass. The dynamic stiffness loses omega times one of them; the basis is good for each of
-        them and what lies between.
-    max_omega, snapshots, tolerance
-        As in `poles`; so many snapshots for each of the moments.
+    `rigid`, shape (d, r): its rigid-body motions, mass-orthonormal, as the basis is; both are orthogonal to each other
+    `moments`: sequence of arrays, shape (d, d). Symmetric, within the bands of the mass. The dynamic stiffness loses omega times one of
+        them; the basis is good for each of them and what lies between.
+    `max_omega`, `snapshots`, `tolerance`: as in `poles`; so many snapshots for each of the moments
     """
     bands = _Bands.of(structure)
     rows, cols = np.nonzero(structure.mass)

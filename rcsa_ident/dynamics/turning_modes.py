@@ -30,23 +30,15 @@ class TurningModes(Shown):
     H(W)^T = H(-W). It takes energy at every frequency and speed as long as D and R are positive semidefinite and K is positive definite:
     skew G does no work.
 
-    Parameters
-    ----------
-    omega_n : array, shape (m,) [rad/s]
-        Undamped natural frequencies of the spindle that does not turn.
-    damping : array, shape (m, m) [rad/s]
-        D, symmetric positive semidefinite.
-    gyroscopic : array, shape (m, m) [-]
-        G, skew: G_ij = integral of 2 rho I (y'_i x'_j - x'_i y'_j) over all that turns.
-    psi : array, shape (m, d) [1/sqrt(kg), 1/sqrt(kg m^2)]
-        Mass-normalised shapes.
-    residual : array, shape (d, d) [m/N, rad/N, m/(N m), rad/(N m)]
-        Static compliance of the modes above the band, symmetric positive semidefinite.
-    speed : float [rad/s]
-        W, positive where the spindle turns from +Y to +X, as a right-hand cutter does.
-    coordinates : tuple of Coordinate, length d
-    stiffness_change : array, shape (m, m) [rad^2/s^2], default none
-        Of a machine that softens with speed: symmetric, at this speed.
+    `omega_n` [rad/s], shape (m,): undamped natural frequencies of the spindle that does not turn
+    `damping` [rad/s], shape (m, m): D, symmetric positive semidefinite
+    `gyroscopic` [-], shape (m, m): G, skew: G_ij = integral of 2 rho I (y'_i x'_j - x'_i y'_j) over all that turns
+    `psi` [1/sqrt(kg), 1/sqrt(kg m^2)], shape (m, d): mass-normalised shapes
+    `residual` [m/N, rad/N, m/(N m), rad/(N m)], shape (d, d): static compliance of the modes above the band, symmetric positive
+        semidefinite
+    `speed` [rad/s]: W, positive where the spindle turns from +Y to +X, as a right-hand cutter does
+    `coordinates`: tuple of Coordinate, length d
+    `stiffness_change`: array, shape (m, m) [rad^2/s^2], default none; of a machine that softens with speed: symmetric, at this speed
 
     Examples
     --------
@@ -138,13 +130,9 @@ class TurningModes(Shown):
 def gyroscopic_poles(natural: FloatArray, damping: FloatArray, moments: FloatArray, psi: FloatArray, residual: FloatArray) -> PoleResidue:
     """Return psi^T [diag(natural^2) - w^2 + i w (damping + moments)]^-1 psi + residual as poles, rising.
 
-    Parameters
-    ----------
-    natural : array, shape (m,) [rad/s]
-    damping, moments : array, shape (m, m) [rad/s]
-        Symmetric and skew.
-    psi : array, shape (m, d) [1/sqrt(kg), 1/sqrt(kg m^2)]
-    residual : array, shape (d, d) [m/N, rad/N, m/(N m), rad/(N m)]
+    `natural` [rad/s], shape (m,)
+    `damping`, `moments` [rad/s], shape (m, m): symmetric and skew
+    `psi` [1/sqrt(kg), 1/sqrt(kg m^2)], shape (m, d); `residual` [m/N, rad/N, m/(N m), rad/(N m)], shape (d, d)
     """
     value, right = _free_motions(natural, damping + moments)
     for _ in range(3):

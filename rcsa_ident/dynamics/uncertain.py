@@ -41,18 +41,13 @@ class Doubted(StrEnum):
 class Variation:
     """Changes of a block of a receptance; the blocks of several variations do not overlap.
 
-    Parameters
-    ----------
-    members : tuple of int
-        Rows, and as well columns, of the receptance that the block covers, b of them.
-    change : complex array, shape (p, n, b, b)
-        Along each of p independent directions, per standard deviation.
-    common : int
-        So many of the last directions are the same ones in all variations.
-    unknowns : mapping of Doubted to array, shape (k, p)
-        What belongs to each, as k unknowns that move so far along the directions; of what is not named nothing is told.
-    parameters : mapping of str to array, shape (k, p)
-        The same, parameter by parameter of a drawing; ``identified`` in front of those that records have told of.
+    `members`: rows, and as well columns, of the receptance that the block covers, b of them
+    `change`, shape (p, n, b, b): along each of p independent directions, per standard deviation
+    `common`: so many of the last directions are the same ones in all variations
+    `unknowns`: mapping of Doubted to array, shape (k, p); what belongs to each, as k unknowns that move so far along the directions; of
+        what is not named nothing is told
+    `parameters`: mapping of str to array, shape (k, p); the same, parameter by parameter of a drawing; ``identified`` in front of those
+        that records have told of
     """
 
     members: tuple[int, ...]
@@ -83,14 +78,10 @@ class Spread(Protocol):
 class UncertainReceptance(Receptance):
     """A receptance and its spread; sums of variations with independent standard normal weights are draws of it.
 
-    Parameters
-    ----------
-    omega, values, rows, cols
-        As of a `Receptance`; rows and columns are the same.
-    variation : Spread or None
-        None where the receptance is taken for exact.
-    poles : callable, returns PoleResidue or None; default none
-        What stands for it where modes are needed, known without a fit; asked only then.
+    `omega`, `values`, `rows`, `cols`: as of a `Receptance`; rows and columns are the same
+    `variation`: None where the receptance is taken for exact
+    `poles`: callable, returns PoleResidue or None; default none; what stands for it where modes are needed, known without a fit; asked only
+        then
     """
 
     variation: Spread | None = None
@@ -233,11 +224,7 @@ class _Part:
 class AtNodes:
     """A spread that many ask at the same places: it is worked out there once.
 
-    Parameters
-    ----------
-    whole : Spread
-    nodes : array of int, shape (k,), ascending
-        Places that suffice for draws (as `UncertainReceptance.thinned` has them).
+    `nodes`: array of int, shape (k,), ascending; places that suffice for draws (as `UncertainReceptance.thinned` has them)
     """
 
     whole: Spread
@@ -270,11 +257,7 @@ class AtNodes:
 class Mixed:
     """A spread between two others whose directions are the same ones: straight lines from the first to the second.
 
-    Parameters
-    ----------
-    first, second : Spread
-    share : float
-        From 0, the first, to 1, the second.
+    `share`: from 0, the first, to 1, the second
     """
 
     first: Spread

@@ -70,15 +70,11 @@ class Problem:
     ) -> Problem:
         """Return the scaled problem; the parameters are those of `rational_fit`, checked here.
 
-        Parameters
-        ----------
-        omega : array, shape (n,) [rad/s]
-        values : complex array, shape (n,), (n, r) or (n, r, c)
-        tolerance : float
-            Relative rms misfit that counts as 1 where no noise is given.
-        noise, weight : arrays of the values' shape (or broadcast to it), or None
-        constant : bool
-            Whether a real constant is fitted, too.
+        `omega` [rad/s], shape (n,)
+        `values`: complex array, shape (n,), (n, r) or (n, r, c)
+        `tolerance`: relative rms misfit that counts as 1 where no noise is given
+        `noise`, `weight`: arrays of the values' shape (or broadcast to it), or None
+        `constant`: whether a real constant is fitted, too
         """
         omega, values = np.asarray(omega, dtype=float), np.asarray(values, dtype=complex)
         if values.shape[:1] != omega.shape or omega.ndim != 1 or values.ndim not in (1, 2, 3):

@@ -49,12 +49,8 @@ class Relay:
 
     A copy that goes elsewhere, to the machines of a cluster, tells nobody.
 
-    Parameters
-    ----------
-    show : callable or None
-        Takes what is told in this process.
-    line : Connection or None
-        Takes it otherwise: the end of a pipe that several processes write to, each word in one piece.
+    `show`: takes what is told in this process
+    `line`: takes it otherwise: the end of a pipe that several processes write to, each word in one piece
     """
 
     def __init__(self, show: Show | None = None, line: Connection | None = None) -> None:
@@ -84,14 +80,9 @@ class Workers:
     Helpers do not run the script that starts them. What it defines itself, or what cannot be pickled, is therefore computed in this process
     alone, and a `RuntimeWarning` says so.
 
-    Parameters
-    ----------
-    helpers : int
-        Processes beside this one.
-    pool : ProcessPoolExecutor or None
-        None without helpers.
-    cluster : ClusterMap or None
-        In place of processes here; it tells nothing on its way.
+    `helpers`: processes beside this one
+    `pool`: None without helpers
+    `cluster`: in place of processes here; it tells nothing on its way
     """
 
     helpers: int = 0
@@ -171,10 +162,7 @@ class _Parcel(ForkingPickler):
 def _packed(function: Callable[[Any], Any], task: Any) -> bytes:
     """Return a task as it is sent: packed here, since neither a helper that cannot unpack nor a pool's thread tells in words.
 
-    Raises
-    ------
-    _Unsendable
-        It names what only the script knows, or what cannot be pickled.
+    Raises `_Unsendable`, which names what only the script knows, or what cannot be pickled.
     """
     held = io.BytesIO()
     try:
@@ -249,12 +237,8 @@ def _warn_alone(reason: _Unsendable) -> None:
 def workers(processes: int | None, early: Sequence[str] = EARLY) -> Iterator[Workers]:
     """Yield worker processes, which start at once; on the way out they are gone, immediately if something went wrong.
 
-    Parameters
-    ----------
-    processes : int or None
-        With the main one; by default one a core, at most 8. A daemonic process, which may have none of its own, works alone.
-    early : sequence of str
-        Modules that the workers import before the first task comes.
+    `processes`: with the main one; by default one a core, at most 8. A daemonic process, which may have none of its own, works alone.
+    `early`: modules that the workers import before the first task comes
     """
     helpers = (processes or min(_cores(), MOST_PROCESSES)) - 1
     if helpers == 0 or multiprocessing.current_process().daemon:

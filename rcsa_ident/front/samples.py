@@ -31,15 +31,11 @@ def simulate_campaign(
 ) -> SimulatedCampaign:
     """Let a virtual machine make its cuts; write the campaign into `out` and the truth into ``<out>.truth``.
 
-    Parameters
-    ----------
-    machine : path of a machine file, or what was read from one
-    out : path
-        A folder that does not exist yet, or an empty one.
-    seed : int
-        Same seed, same files.
-    progress : callable of (done, total), optional
-    mapper : callable like `map`, optional
+    `machine`: path of a machine file, or what was read from one
+    `out`: a folder that does not exist yet, or an empty one
+    `seed`: same seed, same files
+    `progress`: callable of (done, total)
+    `mapper`: callable like `map`
     """
     setup = machine if isinstance(machine, MachineFile) else read_machine(machine)
     toolings = [read_tooling(path) for path in setup.toolings]
@@ -103,14 +99,9 @@ def make_sample_campaign(
 ) -> Path:
     """Have the sample machine make a campaign, unless the folder holds one already, and return the folder.
 
-    Parameters
-    ----------
-    folder : path
-        What is true of the machine goes beside it, into ``<folder>.truth``; no reader of the folder sees that.
-    cuts : int
-        Half of them with each of two toolings, each with its air cut.
-    seed, progress, mapper
-        As of `simulate_campaign`.
+    `folder`: what is true of the machine goes beside it, into ``<folder>.truth``; no reader of the folder sees that
+    `cuts`: half of them with each of two toolings, each with its air cut
+    `seed`, `progress`, `mapper`: as of `simulate_campaign`
     """
     folder = Path(folder)
     if (folder / CAMPAIGN_FILE).is_file():

@@ -12,17 +12,10 @@ from rcsa_ident.identification.unknowns import Unknowns
 class Candidate:
     """What a search goes on from, what is said of it while it runs, and what a service keeps of it.
 
-    Parameters
-    ----------
-    theta : array, shape (p,)
-        Unknowns, see `parameters`.
-    layout : Unknowns
-    nuisance : array, shape (k, 2)
-        Delay [s] and angle to the air cut [rad] of each cut, at their optimum for these unknowns.
-    cost : float [-]
-        chi2 with priors.
-    information : array, shape (p, p)
-        Gauss-Newton matrix of half the cost; its inverse is the covariance of the unknowns.
+    `theta`, shape (p,): unknowns, see `parameters`
+    `nuisance`, shape (k, 2): delay [s] and angle to the air cut [rad] of each cut, at their optimum for these unknowns
+    `cost` [-]: chi2 with priors
+    `information`, shape (p, p): Gauss-Newton matrix of half the cost; its inverse is the covariance of the unknowns
     """
 
     theta: FloatArray

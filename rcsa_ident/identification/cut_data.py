@@ -31,24 +31,15 @@ def prepare(
 ) -> IdentificationData:
     """Return the data of all measurements; each tool-holder is asked once for the frequencies of all its cuts.
 
-    Parameters
-    ----------
-    measurements : sequence of CutMeasurement
-    receptances : mapping of tooling to a function omega -> Receptance
-        Free-free receptances with points ``tip`` and ``flange`` in one bending plane.
-    teeth : mapping of tooling to its number of teeth
-    coefficient_spread : sequence of float, length c
-        Standard deviations of K_tc's, k_rc's, K_te's and K_re's logarithms; 0 where known exactly. Without them the forces are
-        taken as they are, and cutters to run true.
-    turning : mapping of tooling to Turning, optional
-        Asked only where both planes are fitted together.
-    unlike : collection of str
-        Toolings whose teeth are unlike: a delay is one of a turn, and not of a tooth's pitch.
-
-    Raises
-    ------
-    InputError
-        If there are no measurements; if some are of the flange and some of the housing; or if all are of the housing, and of one tooling.
+    `receptances`: mapping of tooling to a function omega -> Receptance, free-free receptances with points ``tip`` and ``flange`` in one
+        bending plane
+    `teeth`: mapping of tooling to its number of teeth
+    `coefficient_spread`: sequence of float, length c. Standard deviations of K_tc's, k_rc's, K_te's and K_re's logarithms; 0 where known
+        exactly. Without them the forces are taken as they are, and cutters to run true.
+    `turning`: mapping of tooling to Turning; asked only where both planes are fitted together
+    `unlike`: toolings whose teeth are unlike: a delay is one of a turn, and not of a tooth's pitch
+    Raises `InputError` if there are no measurements; if some are of the flange and some of the housing; or if all are of the housing, and
+        of one tooling.
     """
     if not measurements:
         raise InputError("cuts", "none usable", "at least one usable cut")

@@ -84,17 +84,10 @@ def diagnose(
 ) -> list[Remark]:
     """Return the reasons for `suspect`.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    solution : Solution
-        All axes together.
-    misfit : Misfit
-        The one whose minimum it is.
-    bands : sequence of float [-]
-        Relative standard deviation of the machine's contribution to the tooltip FRF, for each axis.
-    further : sequence of Remark
-        Reasons that only this kind of fit has.
+    `solution`: all axes together
+    `misfit`: the one whose minimum it is
+    `bands`: sequence of float [-], relative standard deviation of the machine's contribution to the tooltip FRF, for each axis
+    `further`: reasons that only this kind of fit has
     """
     reasons: list[Remark] = []
 
@@ -236,11 +229,7 @@ def not_judged(found: Sequence[Prediction]) -> Remark:
 def two_solutions(data: IdentificationData, searched: Sequence[AxisSearch]) -> list[Remark]:
     """Return for which axes two answers of equal evidence differ, and by how much; or the two likeliest of searches that do not agree.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    searched : sequence of AxisSearch
-        One for each axis.
+    `searched`: one for each axis
     """
     found = []
     for axis, search in zip(data.axes, searched, strict=True):
@@ -263,15 +252,9 @@ def remarks(
 ) -> list[Remark]:
     """Return what the data cannot tell, and what was done about single cuts.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    solution : Solution
-    misfit : Misfit
-    covariance : array, shape (p, p)
-        Covariance of all unknowns.
-    natural : mapping of str to array [rad/s]
-        Natural frequencies of each machine's modes as the result has them, under the name of its axes.
+    `covariance`, shape (p, p): covariance of all unknowns
+    `natural`: mapping of str to array [rad/s], natural frequencies of each machine's modes as the result has them, under the name of its
+        axes
     """
     notes: list[Remark] = []
 

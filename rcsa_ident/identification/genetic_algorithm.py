@@ -38,19 +38,12 @@ WORST_MISFIT = 4.0
 class SearchSpace:
     """Boxes of the variables; the defaults are those of [inprocess], Table 2.
 
-    Parameters
-    ----------
-    natural_frequency_hz, damping_ratio : (low, high)
-    phi_t : float
-        Largest |p3| [sqrt(s/kg)].
-    phase : float
-        Largest |p4| and |p6|.
-    slope_ratio : (low, high)
-        |p5| [1/m]; the sign is free.
-    log_k_t, log_k_r : (low, high)
-        Decimal logarithms of [N/m] and [N m/rad].
-    c_t, c_r : float
-        Largest damping [N s/m], [N m s/rad].
+    `natural_frequency_hz`, `damping_ratio`: (low, high)
+    `phi_t`: largest |p3| [sqrt(s/kg)]
+    `phase`: largest |p4| and |p6|
+    `slope_ratio`: (low, high); |p5| [1/m]; the sign is free
+    `log_k_t`, `log_k_r`: (low, high); decimal logarithms of [N/m] and [N m/rad]
+    `c_t`, `c_r`: largest damping [N s/m], [N m s/rad]
     """
 
     natural_frequency_hz: tuple[float, float] = (600.0, 3500.0)
@@ -82,15 +75,9 @@ class LiteralCost:
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
         """Return the cost of k candidates, shape (k,).
 
-        Parameters
-        ----------
-        misfit : array, shape (k, toolings)
-            Weighted sum of squares of each tooling's lines.
-        points : array, shape (toolings,)
-            Number of lines of each tooling.
-        p3 : array, shape (k, modes) [sqrt(s/kg)]
-            Real parts of the translational shapes.
-        space : SearchSpace
+        `misfit`, shape (k, toolings): weighted sum of squares of each tooling's lines
+        `points`, shape (toolings,): number of lines of each tooling
+        `p3` [sqrt(s/kg)], shape (k, modes): real parts of the translational shapes
         """
         return self.kappa * np.sqrt(misfit).sum(axis=1) + self.nu * np.abs(p3).sum(axis=1)
 
@@ -99,12 +86,8 @@ class LiteralCost:
 class NoiseWeightedCost:
     """The same with each line in its own standard deviations, and a penalty without units.
 
-    Parameters
-    ----------
-    model_error : float
-        Share of each line added to the records' noise.
-    strength : float
-        Penalty of a mode with the largest shape, in units of the rms residual.
+    `model_error`: share of each line added to the records' noise
+    `strength`: penalty of a mode with the largest shape, in units of the rms residual
     """
 
     model_error: float = 0.02
@@ -121,14 +104,7 @@ class NoiseWeightedCost:
 
 @dataclass(frozen=True, slots=True)
 class PaperGeneticAlgorithm:
-    """pymoo's genetic algorithm [blank2020] as [inprocess] sets it: population 20, 5000 iterations, each direction for itself.
-
-    Parameters
-    ----------
-    cost : LiteralCost or NoiseWeightedCost
-    space : SearchSpace
-    modes, population, generations : int
-    """
+    """pymoo's genetic algorithm [blank2020] as [inprocess] sets it: population 20, 5000 iterations, each direction for itself."""
 
     cost: LiteralCost | NoiseWeightedCost = field(default_factory=LiteralCost)
     space: SearchSpace = field(default_factory=SearchSpace)
@@ -144,20 +120,11 @@ class PaperGeneticAlgorithm:
     def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
         """Return the identification; each axis gets a seed of its own.
 
-        Parameters
-        ----------
-        data : IdentificationData
-        seed : int
-            Same seed, same answer, whatever `map` is.
-        map : callable
-            The builtin, or a pool's.
-        progress : callable, optional
-            Told of every step; with a pool's map it has to be picklable.
-
-        Raises
-        ------
-        InputError
-            If hammer tests or passes are among the data, or no displacement of the flange: its candidates know that at one speed alone.
+        `seed`: same seed, same answer, whatever `map` is
+        `map`: the builtin, or a pool's
+        `progress`: told of every step; with a pool's map it has to be picklable
+        Raises `InputError` if hammer tests or passes are among the data, or no displacement of the flange: its candidates know that at one
+            speed alone.
         """
         if data.tests:
             raise InputError("method", f"{self.name}, with hammer tests", "the default method, which knows of them")
@@ -310,11 +277,8 @@ def modal_fractions(omega_n: FloatArray, zeta: FloatArray, phi_t: np.ndarray, ph
 
     a = -2 Re(r conj(lambda)) and b = 2 Re(r) with the residue r = phi_p phi_q, for tt, tr, rr.
 
-    Parameters
-    ----------
-    omega_n, zeta : arrays, shape (..., modes) [rad/s], [-]
-    phi_t, phi_r : complex arrays, shape (..., modes) [sqrt(s/kg)]
-        Shapes: translation, and slope times the lever.
+    `omega_n`, `zeta`: arrays, shape (..., modes) [rad/s], [-]
+    `phi_t`, `phi_r`: complex arrays, shape (..., modes) [sqrt(s/kg)]; shapes: translation, and slope times the lever
     """
     conjugate = -zeta * omega_n - 1j * omega_n * np.sqrt(1.0 - zeta**2)
     columns = [omega_n**2, 2.0 * zeta * omega_n]
@@ -327,13 +291,7 @@ def modal_fractions(omega_n: FloatArray, zeta: FloatArray, phi_t: np.ndarray, ph
 class GeneticSearch:
     """The search of one axis; it answers with the best variables and the best cost of the generations, some five hundred of them.
 
-    Parameters
-    ----------
-    method : PaperGeneticAlgorithm
-    data : IdentificationData
-        Of one axis.
-    seed : int
-    progress : callable or None
+    `data`: of one axis
     """
 
     phase: ClassVar[Phase] = Phase.SEARCH

@@ -32,17 +32,9 @@ def with_tests(cuts: IdentificationData | None, tests: Sequence[HammerLines], at
     Z = (A_22 + K^-1 + B)^-1 [m/N]. What is unknown of it: its gain, a delay between its channels, and where cuts tell of a spindle
     that turns, by how much the machine's natural frequencies and damping differ at standstill.
 
-    Parameters
-    ----------
-    cuts : IdentificationData or None
-        Of its axes that were hit gap and fixture are summed.
-    tests : sequence of HammerLines
-    at_points : mapping of tooling to AtPoints
-
-    Raises
-    ------
-    InputError
-        If there are no tests, or one of them has no lines.
+    `cuts`: of its axes that were hit gap and fixture are summed
+    `at_points`: mapping of tooling to AtPoints
+    Raises `InputError` if there are no tests, or one of them has no lines.
     """
     if not tests:
         raise InputError("frfs", "none", "at least one hammer test")

@@ -27,23 +27,13 @@ _STRIDE = 10
 class HammerLines:
     """Lines of one hammer test.
 
-    Parameters
-    ----------
-    id, tooling : str
-    axis : Dof
-    omega : array, shape (n,) [rad/s]
-        Ascending.
-    value : complex array, shape (n,) [m/N]
-    variance : array, shape (n,) [m^2/N^2]
-        Of the real and imaginary part each.
-    response, force : float or None [m]
-        Distance of the point from the tip; None is the machine's side of the flange.
-    sensor_mass : float [kg]
-        Fixed to the tool-holder where the response is measured.
-    standstill : bool
-        The spindle did not turn.
-    remarks : tuple of Remark
-        What the file does not state and was assumed.
+    `omega` [rad/s], shape (n,): ascending
+    `value` [m/N], shape (n,)
+    `variance` [m^2/N^2], shape (n,): of the real and imaginary part each
+    `response`, `force` [m]: distance of the point from the tip; None is the machine's side of the flange
+    `sensor_mass` [kg]: fixed to the tool-holder where the response is measured
+    `standstill`: the spindle did not turn
+    `remarks`: what the file does not state and was assumed
     """
 
     id: str
@@ -74,9 +64,7 @@ def noise_of(value: ComplexArray) -> FloatArray:
     A smooth curve's second differences are its noise alone: of white noise of variance v they have the variance 6 v. The median
     of the squares over `_WINDOW` lines is log 2 of their mean.
 
-    Parameters
-    ----------
-    value : complex array, shape (n,)
+    `value`, shape (n,)
     """
     if value.size < 3:
         return np.zeros(value.size)
@@ -90,10 +78,7 @@ def noise_of(value: ComplexArray) -> FloatArray:
 def thinned(omega: FloatArray, value: ComplexArray, variance: FloatArray, most: int = MOST_LINES) -> np.ndarray:
     """Return which lines to keep, at most so many: where the curve bends, and some everywhere; indices, ascending.
 
-    Parameters
-    ----------
-    omega, value, variance : arrays, shape (n,)
-    most : int
+    `omega`, `value`, `variance`, shape (n,)
     """
     if omega.size <= most:
         return np.arange(omega.size)

@@ -27,15 +27,9 @@ _CUT_UNITS = np.array([DELAY_UNIT, 1.0])
 class Solution:
     """A vector, its cost, and how it was reached.
 
-    Parameters
-    ----------
-    theta : array, shape (p,)
-    layout : Unknowns
-    evaluation : Evaluation
-        Cost and residual there, with normal equations.
-    converged : bool
-        False where the steps ran out.
-    steps : int
+    `theta`, shape (p,)
+    `evaluation`: cost and residual there, with normal equations
+    `converged`: False where the steps ran out
     """
 
     theta: FloatArray
@@ -66,19 +60,11 @@ def refine(
 ) -> Solution:
     """Return the minimum near `theta`.
 
-    Parameters
-    ----------
-    misfit : Misfit
-    theta : array, shape (p,)
-    layout : Unknowns
-    nuisance : array, shape (k, 2)
-        Delay [s] and angle [rad] at which each cut's own fit starts.
-    max_steps : int
-        Steps after which the search ends unconverged.
-    grid : int
-        Delays tried over a tooth-passing period at every step: needed far from the minimum.
-    tolerance : float
-        Stop where two steps in a row lower the cost by less than this share.
+    `theta`, shape (p,)
+    `nuisance`, shape (k, 2): delay [s] and angle [rad] at which each cut's own fit starts
+    `max_steps`: steps after which the search ends unconverged
+    `grid`: delays tried over a tooth-passing period at every step: needed far from the minimum
+    `tolerance`: stop where two steps in a row lower the cost by less than this share
     """
     here = misfit.evaluate(theta, layout, nuisance, grid, normal=True)
     damping = 1e-2

@@ -19,14 +19,9 @@ DELAY_UNIT = 1e-6
 class Residual:
     """Everything whose squares add up to the cost, in standard deviations.
 
-    Parameters
-    ----------
-    lines : tuple of arrays, shape (2 n,)
-        Residuals of each axis: real parts of all lines, then imaginary parts.
-    own : array, shape (p,)
-        Residuals of the parameters' priors.
-    cuts : array, shape (k, 2)
-        Residuals of the cuts' priors: delay, angle.
+    `lines`: tuple of arrays, shape (2 n,); residuals of each axis: real parts of all lines, then imaginary parts
+    `own`, shape (p,): residuals of the parameters' priors
+    `cuts`, shape (k, 2): residuals of the cuts' priors: delay, angle
     """
 
     lines: tuple[FloatArray, ...]
@@ -57,29 +52,18 @@ class Residual:
 class Linearisation:
     """Residual to first order in the parameters and in each cut's delay and angle; the latter two are eliminated.
 
-    Parameters
-    ----------
-    layout : Unknowns
-    jacobians : tuple of arrays, shape (q + c, 2 n)
-        Change of each axis' lines with its own parameters, the joint's and the coefficients'.
-    columns : tuple of complex arrays, shape (n, 2)
-        The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
-    cut : tuple of int arrays, shape (n,)
-        The cut that each line belongs to.
-    own : array, shape (p, p)
-        The priors' change.
-    cut_prior : array, shape (k, 2)
-        Square roots of the weights of the cuts' priors.
-    clamping : (array of int, array), shape (k,) each
-        Place in the vector of the tooth angle that a cut's prior depends on, and by how much (0 where by none).
-    gradient, hessian : arrays, shapes (p,), (p, p)
-        Of half the cost, the cuts' unknowns eliminated.
-    inner : array, shape (k, 2, 2)
-        Normal equations of each cut's delay and angle.
-    mixed : array, shape (k, 2, p)
-        What couples them to the parameters.
-    compliance : tuple of complex arrays, shape (n o, 3)
-        Change of each axis' residual, as complex numbers, with the flange's receptance tt, tr, rr, for what may be added to it.
+    `jacobians`: tuple of arrays, shape (q + c, 2 n); change of each axis' lines with its own parameters, the joint's and the coefficients'
+    `columns`: tuple of complex arrays, shape (n, 2); the lines' change with their cut's delay (in `DELAY_UNIT`) and angle
+    `cut`: tuple of int arrays, shape (n,); the cut that each line belongs to
+    `own`, shape (p, p): the priors' change
+    `cut_prior`, shape (k, 2): square roots of the weights of the cuts' priors
+    `clamping`: (array of int, array), shape (k,) each; place in the vector of the tooth angle that a cut's prior depends on, and by how
+        much (0 where by none)
+    `gradient`, `hessian`: arrays, shapes (p,), (p, p); of half the cost, the cuts' unknowns eliminated
+    `inner`, shape (k, 2, 2): normal equations of each cut's delay and angle
+    `mixed`, shape (k, 2, p): what couples them to the parameters
+    `compliance`: tuple of complex arrays, shape (n o, 3); change of each axis' residual, as complex numbers, with the flange's receptance
+        tt, tr, rr, for what may be added to it
     """
 
     layout: Unknowns
@@ -129,17 +113,9 @@ class Linearisation:
     def border(self, rows: Mapping[int, FloatArray], together: int, residual: Residual) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return what further unknowns would add to the normal equations, so many of them at a time.
 
-        Parameters
-        ----------
-        rows : mapping of axis number to array, shape (2 n, g q)
-            Change of the axis' lines with them; of the others nothing changes.
-        together : int
-            q.
-        residual : Residual
-
-        Returns
-        -------
-        gradient (g q,), own matrices (g, q, q), mixed with the parameters (p, g q), the cuts' unknowns eliminated from all
+        `rows`: mapping of axis number to array, shape (2 n, g q); change of the axis' lines with them; of the others nothing changes
+        `together`: q
+        Returns gradient (g q,), own matrices (g, q, q), mixed with the parameters (p, g q), the cuts' unknowns eliminated from all.
         """
         cuts = self.inner.shape[0]
         size = next(iter(rows.values())).shape[1]
@@ -176,10 +152,7 @@ class Linearisation:
     def delay_std(self, covariance: FloatArray) -> FloatArray:
         """Return the standard deviation of each cut's delay, shape (k,) [s]: its own fit's, and what the parameters add.
 
-        Parameters
-        ----------
-        covariance : array, shape (p, p)
-            Covariance of the parameters.
+        `covariance`, shape (p, p): covariance of the parameters
         """
         follow = np.linalg.solve(self.inner, self.mixed)[:, 0]
         own = np.linalg.inv(self.inner)[:, 0, 0]

@@ -35,13 +35,8 @@ MOST_KEPT, MOST_KEPT_OF_BOTH = 1_000_000, 200_000
 class SpeedModel(NamedTuple):
     """What the cuts of a single range of spindle speeds say for themselves.
 
-    Parameters
-    ----------
-    speeds : (float, float) [rad/s]
-        Lowest and highest.
-    axes : mapping of Dof to MachineAxis
-    whole : CoupledPosterior or None
-        As in `IdentifiedMachine`.
+    `speeds`: (float, float) [rad/s]; lowest and highest
+    `whole`: as in `IdentifiedMachine`
     """
 
     speeds: tuple[float, float]

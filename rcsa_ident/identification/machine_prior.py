@@ -24,10 +24,7 @@ from rcsa_ident.tool_holder.drawings import KnownToolings
 class Gaussian:
     """A normal distribution as residuals of unit variance, C^-1 (theta - centre) with covariance = C C^T.
 
-    Parameters
-    ----------
-    centre : array, shape (p,)
-    covariance : array, shape (p, p)
+    `centre`, shape (p,); `covariance`, shape (p, p)
     """
 
     centre: FloatArray
@@ -61,13 +58,7 @@ class Gaussian:
 
 @dataclass(frozen=True, eq=False)
 class KnownMachine:
-    """What earlier cuts have told of a machine whose planes feel nothing of each other, and of toolings.
-
-    Parameters
-    ----------
-    posteriors : mapping of Dof to Posterior
-    toolings : KnownToolings or None
-    """
+    """What earlier cuts have told of a machine whose planes feel nothing of each other, and of toolings."""
 
     posteriors: Mapping[Dof, Posterior]
     toolings: KnownToolings | None = None
@@ -80,11 +71,8 @@ class KnownMachine:
     def relative(self, speed: FloatArray, still: float = -1.0) -> FloatArray:
         """Return where speeds [rad/s] lie among the earlier cuts', -1 to 1: beyond them the machine stays as it is at their ends.
 
-        Parameters
-        ----------
-        speed : array, shape (k,) [rad/s]
-        still : float
-            Where a spindle counts that stands still.
+        `speed` [rad/s], shape (k,)
+        `still`: where a spindle counts that stands still
         """
         middle, half = self.speed_range
         if not half:
@@ -101,13 +89,7 @@ class KnownMachine:
         return (-1.0, -middle / half) if softens and middle > half and any(np.any(axis.still) for axis in data.axes) else (-1.0,)
 
     def layout(self, data: IdentificationData) -> Layout:
-        """Return the unknowns of further cuts.
-
-        Raises
-        ------
-        InputError
-            An axis of the cuts is not one of the machine.
-        """
+        """Return the unknowns of further cuts. Raises `InputError`: an axis of the cuts is not one of the machine."""
         axes = []
         for axis in data.axes:
             if axis.axis not in self.posteriors:
@@ -163,15 +145,8 @@ class KnownMachine:
     def entries(self, data: IdentificationData, first: int) -> tuple[np.ndarray, FloatArray]:
         """Return where each number that is known of earlier toolings stands among those of further cuts, and one of its units in theirs.
 
-        Parameters
-        ----------
-        data : IdentificationData
-        first : int
-            Where the forces' unknowns begin.
-
-        Returns
-        -------
-        places (-1 where it does not), factors
+        `first`: where the forces' unknowns begin
+        Returns places (-1 where it does not), factors.
         """
         if self.toolings is None or data.rough is None:
             return np.zeros(0, dtype=np.intp), np.zeros(0)
@@ -185,11 +160,7 @@ class KnownMachine:
 
         Joint stiffnesses of a further clamping differ; what standing still changes is known as before an identification.
 
-        Parameters
-        ----------
-        data : IdentificationData
-        reclamped : float
-            Standard deviation by which the joint's stiffnesses differ in a further clamping: of their logarithms.
+        `reclamped`: standard deviation by which the joint's stiffnesses differ in a further clamping: of their logarithms
         """
         known = [self.posteriors[axis.axis] for axis in data.axes]
         layout = self.layout(data)
@@ -219,16 +190,10 @@ class KnownMachine:
 class FurtherMisfit(Misfit):
     """The residual of further cuts on a machine that is known.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    machine : KnownMachine
-    known : Gaussian
-        As the machine's `prior` returns it.
-    model_error : tuple of float [-]
-    cut_weight : array, shape (k,), optional
-    still : float
-        As in `KnownMachine.relative`.
+    `known`: as the machine's `prior` returns it
+    `model_error`: tuple of float [-]
+    `cut_weight`, shape (k,)
+    `still`: as in `KnownMachine.relative`
     """
 
     def __init__(

@@ -56,14 +56,7 @@ def evidence(solution: Solution, misfit: Misfit) -> float:
 
 
 def fewer(solution: Solution, smallest: int) -> list[Trial]:
-    """Return all models with one mode less: each is left out in turn, and close ones are made one.
-
-    Parameters
-    ----------
-    solution : Solution
-    smallest : int
-        Fewest modes of a plane.
-    """
+    """Return all models with one mode less: each is left out in turn, and close ones are made one. `smallest`: fewest modes of a plane."""
     trials = []
     for k, block in solution.layout.modal:
         machine = unpack(solution.theta[solution.layout.places[k]], block)
@@ -81,15 +74,9 @@ def more(solution: Solution, misfit: Misfit, k: int, band_hz: tuple[float, float
     the entries of psi psi^T, so that all frequencies are judged by one least-squares solution each, the other unknowns and the
     cuts' delays following.
 
-    Parameters
-    ----------
-    solution : Solution
-        With normal equations.
-    misfit : Misfit
-    k : int
-        Block of modes, of a plane or of a whole machine.
-    band_hz : (float, float) [Hz]
-        Lowest and highest line.
+    `solution`: with normal equations
+    `k`: block of modes, of a plane or of a whole machine
+    `band_hz`: (float, float) [Hz]; lowest and highest line
     """
     layout, block = solution.layout, dict(solution.layout.modal)[k]
     axes, count = (range(len(misfit.data.axes)), PROMISING) if block.directions == DIRECTIONS else ((k,), PROMISING_OF_PLANE)
@@ -121,16 +108,10 @@ def drop_modes(
     Every mode of every axis in turn is left out, and close modes are merged; the likeliest omissions get two steps, the two best
     of them are polished and the better one is kept, until the evidence has clearly turned.
 
-    Parameters
-    ----------
-    solution : Solution
-        Polished.
-    misfit : Misfit
-    report : callable of (stage, cost, solution), optional
-    smallest : int
-        Fewest modes of an axis.
-    give_up : float
-        The walk ends where the evidence lies this far behind the best seen.
+    `solution`: polished
+    `report`: callable of (stage, cost, solution)
+    `smallest`: fewest modes of an axis
+    `give_up`: the walk ends where the evidence lies this far behind the best seen
     """
     best, best_evidence = solution, evidence(solution, misfit)
     here = solution
@@ -164,16 +145,10 @@ def exchange_modes(
     A walk downwards alone can't mend a mode that once settled in the wrong place; this one can. It ends with the first round
     that gains nothing.
 
-    Parameters
-    ----------
-    solution : Solution
-        Polished.
-    misfit : Misfit
-    band_hz : (float, float) [Hz]
-        Lowest and highest line.
-    report : callable of (stage, cost, solution), optional
-    rounds : int
-        Most rounds.
+    `solution`: polished
+    `band_hz`: (float, float) [Hz]; lowest and highest line
+    `report`: callable of (stage, cost, solution)
+    `rounds`: most rounds
     """
     best, best_evidence = solution, evidence(solution, misfit)
     for _ in range(rounds):
@@ -197,13 +172,8 @@ def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float])
     A machine has more modes than the data can show. A model that leaves them out is sure of what it cannot know; with them the
     posterior is as wide as it should be.
 
-    Parameters
-    ----------
-    solution : Solution
-        Polished.
-    misfit : Misfit
-    band_hz : (float, float) [Hz]
-        Lowest and highest line.
+    `solution`: polished
+    `band_hz`: (float, float) [Hz]; lowest and highest line
     """
     for k, _ in solution.layout.modal:
         trials = []
@@ -218,15 +188,9 @@ def new_modes(
 ) -> list[tuple[float, float, FloatArray]]:
     """Return natural frequency [rad/s], damping ratio and shape of the modes that promise most, best first; see `promising`.
 
-    Parameters
-    ----------
-    solution : Solution
-        With normal equations; its compliance tells what the shape has an entry for.
-    misfit : Misfit
-    axes : sequence of int
-        Whose lines such a mode moves.
-    band_hz : (float, float) [Hz]
-    count : int
+    `solution`: with normal equations; its compliance tells what the shape has an entry for
+    `axes`: whose lines such a mode moves
+    `band_hz`: (float, float) [Hz]
     """
     linear = solution.evaluation.linear
     assert linear is not None
@@ -302,13 +266,8 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
     The share f solves sum |rest|^2 / (variance + f^2 |h|^2 / 2) = degrees of freedom, the data's less those that parameters
     and cuts have used.
 
-    Parameters
-    ----------
-    solution : Solution
-        With normal equations.
-    misfit : Misfit
-    smallest : float
-        Floor: no simulated force is better than that.
+    `solution`: with normal equations
+    `smallest`: floor: no simulated force is better than that
     """
     layout, data = solution.layout, misfit.data
     jacobian = misfit.prior(layout).jacobian
@@ -356,15 +315,9 @@ def unexplained_share(squares: FloatArray, noise: FloatArray, size: FloatArray, 
 
     By bisection of its logarithm: the sum falls with it.
 
-    Parameters
-    ----------
-    squares : array, shape (n,)
-        Squared residuals of lines, real and imaginary part together.
-    noise : array, shape (n,)
-        Variance of the real and of the imaginary part each.
-    size : array, shape (n,)
-        Power of the lines.
-    freedom, smallest : float
+    `squares`, shape (n,): squared residuals of lines, real and imaginary part together
+    `noise`, shape (n,): variance of the real and of the imaginary part each
+    `size`, shape (n,): power of the lines
     """
     low, high = smallest, 1.0
     # lines of nothing, in a record without noise, say nothing about shares

@@ -23,14 +23,7 @@ LONGEST_STEP = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneUnknowns:
-    """Unknowns of one axis' flange and of the joint, as a search starts from them.
-
-    Parameters
-    ----------
-    theta : array, shape (p,)
-    layout : ModalBlock
-        Without fixture.
-    """
+    """Unknowns of one axis' flange and of the joint, as a search starts from them. `theta`, shape (p,). `layout`: without fixture."""
 
     theta: FloatArray
     layout: ModalBlock
@@ -45,23 +38,15 @@ class PlaneUnknowns:
 class Posterior:
     """Unknowns of one axis' flange and of the joint with their covariance.
 
-    Parameters
-    ----------
-    theta : array, shape (p,)
-        The most probable unknowns.
-    covariance : array, shape (p, p)
-    layout : ModalBlock
-        Which unknown stands where; without fixture.
-    speed_range : (float, float) [rad/s]
-        Middle of the campaign's spindle speeds and half their range; only a layout with softening asks for it.
-    rivals : tuple of array
-        Unknowns of other models of the same data, with fewer modes or more: how far they differ belongs to what is not known.
-    tooling_cross : array, shape (p, u)
-        Covariance of the unknowns with what is known of toolings (`KnownToolings`), in its units.
-    tooling_covariance : array, shape (u, u)
-        Of that.
-    rival_toolings : tuple of array, shape (u,) each
-        How far each rival's toolings are from those.
+    `theta`, shape (p,): the most probable unknowns
+    `covariance`, shape (p, p)
+    `layout`: which unknown stands where; without fixture
+    `speed_range`: (float, float) [rad/s]; middle of the campaign's spindle speeds and half their range; only a layout with softening asks
+        for it
+    `rivals`: unknowns of other models of the same data, with fewer modes or more: how far they differ belongs to what is not known
+    `tooling_cross`, shape (p, u): covariance of the unknowns with what is known of toolings (`KnownToolings`), in its units
+    `tooling_covariance`, shape (u, u): of that
+    `rival_toolings`: tuple of array, shape (u,) each; how far each rival's toolings are from those
     """
 
     theta: FloatArray
@@ -89,13 +74,9 @@ class Posterior:
 
         Outside the campaign's speeds the machine of the nearest of them answers.
 
-        Parameters
-        ----------
-        axis : Dof
-            Bending plane of the answer.
-        theta : array, shape (p,), optional
-            Unknowns, of this model or of a rival; by default the optimum's.
-        speed : float, optional [rad/s]
+        `axis`: bending plane of the answer
+        `theta`, shape (p,): unknowns, of this model or of a rival; by default the optimum's
+        `speed` [rad/s]
         """
         vector = self.theta if theta is None else theta
         layout = self.layout if vector.size == self.theta.size else self.layout_of(vector.size - JOINT)
@@ -136,13 +117,9 @@ class Posterior:
 def steps_along(theta: FloatArray, covariance: FloatArray, candidate: Callable[[FloatArray], JointedFlange]) -> tuple[Perturbation, ...]:
     """Return the machines a step to both sides along each of a covariance's own axes.
 
-    Parameters
-    ----------
-    theta : array, shape (p,)
-        The most probable unknowns.
-    covariance : array, shape (p, p)
-    candidate : callable
-        Unknowns to what stands behind the flange.
+    `theta`, shape (p,): the most probable unknowns
+    `covariance`, shape (p, p)
+    `candidate`: unknowns to what stands behind the flange
     """
     values, vectors = np.linalg.eigh(covariance)
     steps = []
@@ -157,15 +134,7 @@ def steps_along(theta: FloatArray, covariance: FloatArray, candidate: Callable[[
 
 @dataclass(frozen=True, slots=True)
 class MachineAxis:
-    """One axis of an identified machine.
-
-    Parameters
-    ----------
-    spindle : Spindle
-    joint : LumpedJoint
-    posterior : Posterior or None
-        Where the identification gave one.
-    """
+    """One axis of an identified machine. `posterior`: where the identification gave one."""
 
     spindle: Spindle
     joint: LumpedJoint

@@ -21,13 +21,9 @@ from rcsa_ident.identification.unknowns import CoupledLayout
 class FittedLines:
     """Lines of one axis, by frequency, beside a candidate's.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-    measured : complex array, shape (n,) [m/N]
-        The flange's motion over the force at the tip, up to each cut's delay.
-    model : complex array, shape (n,) [m/N]
-        The same without delay.
+    `omega` [rad/s], shape (n,)
+    `measured` [m/N], shape (n,): the flange's motion over the force at the tip, up to each cut's delay
+    `model` [m/N], shape (n,): the same without delay
     """
 
     omega: FloatArray
@@ -38,10 +34,7 @@ class FittedLines:
 class Preview:
     """Lines of an identification's data beside those of the candidates that `EvidenceSelection` tells of.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        That the method was given.
+    `data`: that the method was given
     """
 
     def __init__(self, data: IdentificationData) -> None:

@@ -15,32 +15,18 @@ from rcsa_ident.base.arrays import FloatArray, frozen
 class Priors:
     """Means and standard deviations; wide enough for any spindle with a hollow-taper or steep-taper interface.
 
-    Parameters
-    ----------
-    frequency_hz, frequency_spread : float [Hz], [-]
-        Centre of the natural frequencies and spread of their logarithm.
-    shape : float [1/sqrt(kg)]
-        Spread of a mass-normalised shape: 1 is a modal mass of 1 kg at the flange.
-    damping_ratio, damping_spread : float [-]
-        Centre of a mode's own damping ratio and spread of its logarithm.
-    damping_coupling : float [-]
-        Spread of the damping factor's off-diagonal, in its unit.
-    residual : float [-]
-        Spread of the residual compliance's factor, in its unit of sqrt(1 nm/N).
-    joint : tuple of float
-        Centres of k_t [N/m], k_r [N m/rad], c_t [N s/m], c_r [N m s/rad].
-    joint_spread : float [-]
-        Spread of the logarithms of these.
-    softening : float [-]
-        Spread of the stiffness' change from the middle of the campaign's speeds to its ends, as a share.
-    standstill : (float, float) [-]
-        Spreads of the shares by which natural frequencies and damping differ while the spindle stands still.
-    skew : float [-]
-        Spread of an entry of the gyroscopic coupling G: 0.05 splits a pair of modes at 20 000 rev/min by 8 Hz to either side.
-    pull : float [sqrt(kg)]
-        Spread of what the housing's motion pulls a mode of a carried spindle with: a shaft of some kilograms.
-    tooth_angle : float [rad]
-        Spread of a clamping's unknown tooth angle: wider than a turn, any angle will do.
+    `frequency_hz`, `frequency_spread`: float [Hz], [-]; centre of the natural frequencies and spread of their logarithm
+    `shape` [1/sqrt(kg)]: spread of a mass-normalised shape: 1 is a modal mass of 1 kg at the flange
+    `damping_ratio`, `damping_spread` [-]: centre of a mode's own damping ratio and spread of its logarithm
+    `damping_coupling` [-]: spread of the damping factor's off-diagonal, in its unit
+    `residual` [-]: spread of the residual compliance's factor, in its unit of sqrt(1 nm/N)
+    `joint`: centres of k_t [N/m], k_r [N m/rad], c_t [N s/m], c_r [N m s/rad]
+    `joint_spread` [-]: spread of the logarithms of these
+    `softening` [-]: spread of the stiffness' change from the middle of the campaign's speeds to its ends, as a share
+    `standstill`: (float, float) [-]; spreads of the shares by which natural frequencies and damping differ while the spindle stands still
+    `skew` [-]: spread of an entry of the gyroscopic coupling G: 0.05 splits a pair of modes at 20 000 rev/min by 8 Hz to either side
+    `pull` [sqrt(kg)]: spread of what the housing's motion pulls a mode of a carried spindle with: a shaft of some kilograms
+    `tooth_angle` [rad]: spread of a clamping's unknown tooth angle: wider than a turn, any angle will do
     """
 
     frequency_hz: float = 1500.0
@@ -86,16 +72,11 @@ class Known(Protocol):
 class PriorRows:
     """The priors as residuals of unit variance, (theta - centre) / spread, where a mode's damping follows its frequency.
 
-    Parameters
-    ----------
-    centre, spread : arrays, shape (p,)
-    own : array of int
-        Diagonal entries of the damping factors: 2 log L_nn - log(2 zeta omega_n) is what is known, so these rows have a second
-        entry, at `frequency`.
-    frequency : array of int
-        Places of the modes' frequencies, in the order of `own`.
-    jacobian : array, shape (p, p)
-        Derivative of the residuals; it is the same for every vector.
+    `centre`, `spread`, shape (p,)
+    `own`: diagonal entries of the damping factors: 2 log L_nn - log(2 zeta omega_n) is what is known, so these rows have a second entry, at
+        `frequency`
+    `frequency`: places of the modes' frequencies, in the order of `own`
+    `jacobian`, shape (p, p): derivative of the residuals; it is the same for every vector
     """
 
     centre: FloatArray

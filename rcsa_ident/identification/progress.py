@@ -30,17 +30,10 @@ class Stage(StrEnum):
 class Step:
     """One step of a search.
 
-    Parameters
-    ----------
-    axis : str
-        x, y or `BOTH`.
-    stage : Stage
-    cost : float
-        What it came to; of `Stage.MODES` minus twice the log evidence, which may be below zero.
-    modes : int
-        Of all its axes together.
-    candidate : Candidate or None
-        Where the search stands, told while it runs; a trace does not keep it.
+    `axis`: x, y or `BOTH`
+    `cost`: what it came to; of `Stage.MODES` minus twice the log evidence, which may be below zero
+    `modes`: of all its axes together
+    `candidate`: where the search stands, told while it runs; a trace does not keep it
     """
 
     axis: str

@@ -80,15 +80,9 @@ class IdentificationCode(RemarkCode):
 class MetTest:
     """How the answer meets one hammer test.
 
-    Parameters
-    ----------
-    lines : HammerLines
-    model : complex array, shape (n,) [m/N]
-        At the test's lines, its gain and what standing still changes included.
-    gain, gain_std : float [-]
-        By which the test differs from the model, and its standard deviation.
-    chi2_per_point : float [-]
-        Mean squared residual in standard deviations, before the test was given less weight.
+    `model` [m/N], shape (n,): at the test's lines, its gain and what standing still changes included
+    `gain`, `gain_std` [-]: by which the test differs from the model, and its standard deviation
+    `chi2_per_point` [-]: mean squared residual in standard deviations, before the test was given less weight
     """
 
     lines: HammerLines
@@ -106,12 +100,8 @@ class MetTest:
 class Standstill(NamedTuple):
     """By which shares a machine whose spindle stands still differs from one whose spindle turns, with their standard deviations.
 
-    Parameters
-    ----------
-    frequency, frequency_std : float [-]
-        Of all natural frequencies.
-    damping, damping_std : float [-]
-        Of all damping.
+    `frequency`, `frequency_std` [-]: of all natural frequencies
+    `damping`, `damping_std` [-]: of all damping
     """
 
     frequency: float
@@ -124,27 +114,16 @@ class Standstill(NamedTuple):
 class AxisResult:
     """What was found for one machine axis.
 
-    Parameters
-    ----------
-    modes : ModalModel
-        Modes of machine and spindle at the flange: translation and slope.
-    joint : LumpedJoint
-    chi2_per_point : float [-]
-        Mean squared residual in standard deviations of noise and model error.
-    per_tooling : mapping of str to float
-        The same for each tooling by itself.
-    model_error : float [-]
-        Share of each line that neither the model nor the records' noise explains, learned from the residuals.
-    parameters : tuple of str
-        Names of the unknowns of flange and joint, in the posterior's order.
-    posterior : Posterior or None
-        None where the method gives no covariance.
-    measured : mapping with arrays omega, value, model, cut (index), coherence
-        Lines without delay beside the model's: what a plot shows. The cuts' alone; empty arrays without cuts.
-    tests : tuple of MetTest
-        The axis' hammer tests.
-    standstill : Standstill or None
-        Where such tests at standstill stand beside cuts.
+    `modes`: modes of machine and spindle at the flange: translation and slope
+    `chi2_per_point` [-]: mean squared residual in standard deviations of noise and model error
+    `per_tooling`: the same for each tooling by itself
+    `model_error` [-]: share of each line that neither the model nor the records' noise explains, learned from the residuals
+    `parameters`: names of the unknowns of flange and joint, in the posterior's order
+    `posterior`: None where the method gives no covariance
+    `measured`: mapping with arrays omega, value, model, cut (index), coherence. Lines without delay beside the model's: what a plot shows.
+        The cuts' alone; empty arrays without cuts.
+    `tests`: the axis' hammer tests
+    `standstill`: where such tests at standstill stand beside cuts
     """
 
     modes: ModalModel
@@ -168,41 +147,22 @@ class AxisResult:
 class Identification(Shown):
     """Modes of machine and spindle, joint, delays; with status, statistics, seed.
 
-    Parameters
-    ----------
-    status : Status
-    reasons : tuple of Remark
-        Why it is suspect or has failed.
-    notes : tuple of Remark
-        What the data cannot tell, and what was done about single cuts.
-    coefficients : mapping of ForceCoefficient to (float, float)
-        What was found of the forces' uncertain coefficients and its standard deviation: logarithms of scales, run-outs in units of
-        the cutting model's reference.
-    seed : int
-    method : str
-    axes : mapping of Dof to AxisResult
-    cut_ids : tuple of str, length k
-    delay, delay_std : arrays, shape (k,) [s]
-        Tooth 1 stands at immersion 0 that much after the record's start.
-    spindle_speed : array, shape (k,) [rad/s]
-    trace : tuple of Step
-        The search in order.
-    campaign : str
-        Its name.
-    workpiece : Workpiece or None
-        That it cut.
-    sensors : tuple of Sensor
-        That recorded it.
-    whole : CoupledPosterior or None
-        Where both planes had to be fitted together; `axes` then hold each plane at standstill, without the other one.
-    toolings : KnownToolings or None
-        What the cuts told of toolings whose drawings are not exact.
-    learned : tuple of LearnedValue
-        The same in the terms of the campaign's drawings.
-    workpiece_side : WorkpieceSide or None
-        What accelerometers on table or workpiece showed.
-    predictions : tuple of Prediction
-        How the lines of each tooling are predicted by the other ones.
+    `reasons`: why it is suspect or has failed
+    `notes`: what the data cannot tell, and what was done about single cuts
+    `coefficients`: mapping of ForceCoefficient to (float, float); what was found of the forces' uncertain coefficients and its standard
+        deviation: logarithms of scales, run-outs in units of the cutting model's reference
+    `cut_ids`: tuple of str, length k
+    `delay`, `delay_std` [s], shape (k,): tooth 1 stands at immersion 0 that much after the record's start
+    `spindle_speed` [rad/s], shape (k,)
+    `trace`: the search in order
+    `campaign`: its name
+    `workpiece`: that it cut
+    `sensors`: that recorded it
+    `whole`: where both planes had to be fitted together; `axes` then hold each plane at standstill, without the other one
+    `toolings`: what the cuts told of toolings whose drawings are not exact
+    `learned`: the same in the terms of the campaign's drawings
+    `workpiece_side`: what accelerometers on table or workpiece showed
+    `predictions`: how the lines of each tooling are predicted by the other ones
     """
 
     status: Status
@@ -248,13 +208,7 @@ class Identification(Shown):
 
     @property
     def machine(self) -> IdentifiedMachine:
-        """The machine that was found: it takes any tooling.
-
-        Raises
-        ------
-        InputError
-            If the identification has failed: there is none.
-        """
+        """The machine that was found: it takes any tooling. Raises `InputError` if the identification has failed: there is none."""
         if not self.axes:
             raise InputError("identification", f"{self.status}: {'; '.join(self.reasons)}", "one that found a machine")
         return IdentifiedMachine(
@@ -279,11 +233,8 @@ class Identification(Shown):
 def workpiece_after(told: Workpiece | None, found: Mapping[ForceTerm, tuple[float, float]]) -> Workpiece | None:
     """Return a campaign's workpiece whose coefficients are as well known as its cuts have left them.
 
-    Parameters
-    ----------
-    told : Workpiece or None
-    found : mapping of ForceTerm to (float, float) [-]
-        Logarithms of the factors on what was told, and their standard deviations; what is not there is known as told.
+    `found`: mapping of ForceTerm to (float, float) [-]; logarithms of the factors on what was told, and their standard deviations; what is
+        not there is known as told
     """
     if told is None:
         return None
@@ -295,17 +246,10 @@ def workpiece_after(told: Workpiece | None, found: Mapping[ForceTerm, tuple[floa
 def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence[str], tests: int = 0) -> str:
     """Return what an identification has come to: a line, and a second one where something speaks against it.
 
-    Parameters
-    ----------
-    status : str
-    cuts : int
-        That were used.
-    modes : mapping of axis to int
-        How many each has.
-    reasons : sequence of str
-        Why it is not simply converged.
-    tests : int
-        Hammer tests that were used.
+    `cuts`: that were used
+    `modes`: mapping of axis to int, how many each has
+    `reasons`: why it is not simply converged
+    `tests`: hammer tests that were used
     """
     used = [f"{cuts} cuts"] * bool(cuts or not tests) + [f"{tests} hammer test{'s'[: tests != 1]}"] * bool(tests)
     line = ", ".join([status, *used, *(f"{axis.upper()} {count} mode{'s'[: count != 1]}" for axis, count in modes.items())])

@@ -20,15 +20,9 @@ LEAST_SPREAD = 1e-5
 def with_scales(data: IdentificationData, depth: FloatArray, gain: FloatArray, delay: FloatArray) -> IdentificationData:
     """Return the same data whose forces may be off by a factor of each tooling, its depth, and motions by gain and delay of each axis.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    depth : array, shape (toolings,) [-]
-        Standard deviation of the logarithm of each tooling's axial depth; 0 where it is known exactly.
-    gain : array, shape (axes,) [-]
-        Of that of each axis' sensor's gain.
-    delay : array, shape (axes,) [s]
-        Of each axis' sensor's delay.
+    `depth` [-], shape (toolings,): standard deviation of the logarithm of each tooling's axial depth; 0 where it is known exactly
+    `gain` [-], shape (axes,): of that of each axis' sensor's gain
+    `delay` [s], shape (axes,): of each axis' sensor's delay
     """
     deep, loud, late = (np.flatnonzero(each) for each in (depth, gain, delay))
     columns = []
@@ -44,13 +38,9 @@ def with_scales(data: IdentificationData, depth: FloatArray, gain: FloatArray, d
 def with_corners(data: IdentificationData, owners: Sequence[str], changes: Sequence[ComplexArray]) -> IdentificationData:
     """Return the same data whose cutters may have other corner radii than told.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    owners : sequence of str, length of the data's toolings
-        Tools of one model have one corner radius; empty where it is known exactly.
-    changes : sequence of complex array, one an axis, shape (n,)
-        Logarithms of the ratio of each line's force with a corner radius that is larger by its standard deviation.
+    `owners`: sequence of str, length of the data's toolings; tools of one model have one corner radius; empty where it is known exactly
+    `changes`: sequence of complex array, one an axis, shape (n,); logarithms of the ratio of each line's force with a corner radius that is
+        larger by its standard deviation
     """
     unknowns = [owner for owner in dict.fromkeys(owners) if owner]
     if not unknowns:
@@ -63,11 +53,7 @@ def with_corners(data: IdentificationData, owners: Sequence[str], changes: Seque
 def with_cross_talk(data: IdentificationData, spread: FloatArray) -> IdentificationData:
     """Return the same data whose displacement sensors may feel a share of the other axis' motion.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    spread : array, shape (axes,) [-]
-        Standard deviation of that share; 0 where it feels nothing.
+    `spread` [-], shape (axes,): standard deviation of that share; 0 where it feels nothing
     """
     if len(data.axes) < 2 or not np.any(spread) or not all(axis.force.size for axis in data.axes):
         return data
@@ -89,13 +75,8 @@ def with_cross_talk(data: IdentificationData, spread: FloatArray) -> Identificat
 def with_distances(data: IdentificationData, distance: FloatArray, spread: FloatArray) -> IdentificationData:
     """Return the same data whose flange sensors look behind the joint.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    distance : array, shape (axes,) [m]
-        Towards the spindle's rear; negative: at the holder.
-    spread : array, shape (axes,) [m]
-        Its standard deviation; 0 where it is known exactly.
+    `distance` [m], shape (axes,): towards the spindle's rear; negative: at the holder
+    `spread` [m], shape (axes,): its standard deviation; 0 where it is known exactly
     """
     axes = tuple(replace(axis, behind=float(d) / LEVER) for axis, d in zip(data.axes, distance, strict=True))
     seeing = [i for i, axis in enumerate(axes) if axis.of_flange]
@@ -128,15 +109,7 @@ def with_rough_forces(data: IdentificationData) -> IdentificationData:
 
 
 def with_rough_toolings(data: IdentificationData, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
-    """Return the same data whose tool-holders are known only roughly.
-
-    Parameters
-    ----------
-    data : IdentificationData
-    rough : RoughToolings
-        Of all toolings, in the data's order.
-    holders : sequence of RoughToolHolder
-    """
+    """Return the same data whose tool-holders are known only roughly. `rough`: of all toolings, in the data's order."""
     count, first = len(rough.unknowns), len(data.coefficient_spread)
     held = replace(with_rough_forces(data), rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
     return held.with_unknowns((1.0,) * count, None)

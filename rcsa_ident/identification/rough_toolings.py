@@ -16,15 +16,11 @@ from rcsa_ident.tool_holder.rough import RoughToolHolder
 class ToolingAt(NamedTuple):
     """A rough tooling at the points of one axis that it cut.
 
-    Parameters
-    ----------
-    points : array of int, shape (k,)
-    values : complex array, shape (k, 5) [m/N], or (k, 6) where its tip was hit
-        Flange tt, tr, rr, flange over tip t, r, scaled by the lever, and the tip over the tip.
-    slopes : complex array, shape (k, 5, m) or (k, 6, m), no rows where nobody asked
-        Their change with each of its unknowns.
-    unknowns : array of int, shape (m,)
-        Where these stand among the coefficients.
+    `points`: array of int, shape (k,)
+    `values`: complex array, shape (k, 5) [m/N], or (k, 6) where its tip was hit; flange tt, tr, rr, flange over tip t, r, scaled by the
+        lever, and the tip over the tip
+    `slopes`: complex array, shape (k, 5, m) or (k, 6, m), no rows where nobody asked; their change with each of its unknowns
+    `unknowns`: array of int, shape (m,); where these stand among the coefficients
     """
 
     points: np.ndarray
@@ -36,12 +32,8 @@ class ToolingAt(NamedTuple):
 def placed(holder: ComplexArray, toolings: Sequence[ToolingAt], hit: np.ndarray) -> ComplexArray:
     """Return receptances of tool-holders as the kernel takes them with those of rough toolings in place of the drawn ones, shape (n, 8).
 
-    Parameters
-    ----------
-    holder : complex array, shape (n, 8) [m/N]
-    toolings : sequence of ToolingAt
-    hit : array of bool, shape (n,)
-        Points that are a hit tip's motion.
+    `holder` [m/N], shape (n, 8)
+    `hit`: array of bool, shape (n,); points that are a hit tip's motion
     """
     found = holder.copy()
     for each in toolings:
@@ -70,18 +62,11 @@ class _Asked(NamedTuple):
 class RoughLines:
     """Tool-holders at the lines of all axes, as functions of what their drawings do not tell.
 
-    Parameters
-    ----------
-    toolings : RoughToolings
-    holders : sequence of RoughToolHolder
-        One for each tooling.
-    points : sequence of (array, array)
-        Of each axis: frequency [rad/s] and number of the tooling at each point.
-    lever : float [m]
-    first : int
-        Where their unknowns begin among the coefficients.
-    hit : collection of int
-        Toolings whose tip was hit: its own receptance is among their lines.
+    `holders`: one for each tooling
+    `points`: sequence of (array, array); of each axis: frequency [rad/s] and number of the tooling at each point
+    `lever` [m]
+    `first`: where their unknowns begin among the coefficients
+    `hit`: toolings whose tip was hit: its own receptance is among their lines
     """
 
     def __init__(
@@ -109,14 +94,7 @@ class RoughLines:
             self._asked.append(_Asked(t, holder, fields, rows[:, members], members, omega, own, places, t in hit))
 
     def at(self, values: FloatArray, slopes: bool) -> list[list[ToolingAt]]:
-        """Return each axis' rough toolings.
-
-        Parameters
-        ----------
-        values : array, shape (u,)
-            The unknowns, in units of their spreads.
-        slopes : bool
-        """
+        """Return each axis' rough toolings. `values`, shape (u,): the unknowns, in units of their spreads."""
         found: list[list[ToolingAt]] = [[] for _ in range(self._axes)]
         for each in self._asked:
             by = self.toolings.alteration(each.tooling, values)

@@ -18,13 +18,8 @@ from rcsa_ident.identification.unknowns import DAMPING_UNIT, JOINT, Layout, flan
 class SearchSettings:
     """How far the search looks.
 
-    Parameters
-    ----------
-    modes : int
-        More than a spindle has in the band: what is not needed is dropped later.
-    population, generations : int
-    steps : int
-        Gauss-Newton steps of a candidate per generation: real work beside the search's own cost.
+    `modes`: more than a spindle has in the band: what is not needed is dropped later
+    `steps`: Gauss-Newton steps of a candidate per generation: real work beside the search's own cost
     """
 
     modes: int = 10
@@ -40,15 +35,9 @@ def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit,
 
     Every machine has modes below and above what is excited; a search that starts without them ends without them.
 
-    Parameters
-    ----------
-    count, modes : int
-        Number of vectors, and of modes in each.
-    band_hz : (float, float) [Hz]
-        Lowest and highest line.
-    misfit : Misfit
-        Of one output; its priors give the joint's centre.
-    rng : numpy.random.Generator
+    `count`, `modes`: number of vectors, and of modes in each
+    `band_hz`: (float, float) [Hz]; lowest and highest line
+    `misfit`: of one output; its priors give the joint's centre
     """
     low, high = band_hz
     layout = flange_layout(modes, places=misfit.data.axes[0].places).axes[0]
@@ -79,15 +68,9 @@ def explore(
 ) -> list[Solution]:
     """Return the last population, best first, for one axis.
 
-    Parameters
-    ----------
-    misfit : Misfit
-        The misfit of one axis, with a coarse model error (0.3): it smooths the landscape while the delays are found.
-    settings : SearchSettings
-    band_hz : (float, float) [Hz]
-        Lowest and highest line.
-    rng : numpy.random.Generator
-    report : callable of (stage, cost, solution), optional
+    `misfit`: the misfit of one axis, with a coarse model error (0.3): it smooths the landscape while the delays are found
+    `band_hz`: (float, float) [Hz]; lowest and highest line
+    `report`: callable of (stage, cost, solution)
     """
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.core.problem import Problem

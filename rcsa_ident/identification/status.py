@@ -28,12 +28,8 @@ class Status(StrEnum):
 def too_few(toolings: Iterable[str], of_flange: bool = True) -> str | None:
     """Return a sentence where the usable cuts are too few for an answer without doubts, else None.
 
-    Parameters
-    ----------
-    toolings : iterable of str
-        Of each usable cut.
-    of_flange : bool
-        Whether sensors see the flange; accelerometers on the housing alone do not.
+    `toolings`: of each usable cut
+    `of_flange`: whether sensors see the flange; accelerometers on the housing alone do not
     """
     needed, words = (FEWEST_TOOLINGS, "two toolings") if of_flange else (FEWEST_OF_HOUSING, "three toolings, as no sensor sees the flange,")
     if sum(count >= FEWEST_CUTS for count in Counter(toolings).values()) >= needed:

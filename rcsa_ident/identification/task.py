@@ -42,13 +42,7 @@ def perform(task: Task) -> Any:
 
 
 def finite(answers: Iterable[Any]) -> list[Any]:
-    """Return the answers of a phase.
-
-    Raises
-    ------
-    FloatingPointError
-        If one of them is none.
-    """
+    """Return the answers of a phase. Raises `FloatingPointError` if one of them is none."""
     found = list(answers)
     if any(answer is None for answer in found):
         raise FloatingPointError("a task without a finite answer")

@@ -32,16 +32,7 @@ _STIFFNESSES = ("translational_stiffness", "rotational_stiffness")
 
 @dataclass(frozen=True, eq=False)
 class FurtherFit:
-    """The most probable toolings, machine and forces of further cuts.
-
-    Parameters
-    ----------
-    data : IdentificationData
-    known : Gaussian
-        What was known before.
-    solution : Solution
-    misfit : FurtherMisfit
-    """
+    """The most probable toolings, machine and forces of further cuts. `known`: what was known before."""
 
     data: IdentificationData
     known: Gaussian
@@ -97,11 +88,7 @@ class FurtherFit:
         it, m: v + K dm with K = cov(v, m) cov(m)^-1, and cov(v) - K (cov(m) - cov'(m)) K^T. Of these cuts' own toolings it holds how they
         differ from what was learned of them: contact and section, hardly told apart, are known well together.
 
-        Parameters
-        ----------
-        known : KnownMachine
-        names : sequence of str
-            Of the toolings of these cuts.
+        `names`: of the toolings of these cuts
         """
         layout, theta, covariance = planes(self.solution.layout), self.solution.theta, self.covariance_of_all
         machine = known.places(layout)
@@ -166,13 +153,8 @@ class FurtherFit:
 def fit_further(data: IdentificationData, machine: KnownMachine, reclamped: float) -> FurtherFit:
     """Return what further cuts tell: the likeliest of fits that start from several contacts, first each tooling by itself.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        Of rough toolings; the flange's motion was measured.
-    machine : KnownMachine
-    reclamped : float
-        As in `KnownMachine.prior`.
+    `data`: of rough toolings; the flange's motion was measured
+    `reclamped`: as in `KnownMachine.prior`
     """
     if data.rough is None:
         raise InputError("toolings", "drawings that are exact", "toolings with a [spread] table: nothing of others is to be learned")

@@ -37,16 +37,9 @@ TOO_WIDE = 0.5
 class Prediction:
     """A tooling's measured lines along an axis against those that the other toolings predict.
 
-    Parameters
-    ----------
-    tooling : str
-    axis : Dof
-    error : float [-]
-        Norm of the difference over that of what was measured.
-    promised : float [-]
-        The same as bands and noise promise it: the root mean square.
-    typical : float [-]
-        Promised deviation of a line over its size: the median. A few lines at a resonance make the root mean square.
+    `error` [-]: norm of the difference over that of what was measured
+    `promised` [-]: the same as bands and noise promise it: the root mean square
+    `typical` [-]: promised deviation of a line over its size: the median. A few lines at a resonance make the root mean square.
     """
 
     tooling: str
@@ -64,14 +57,9 @@ class Prediction:
 def predictions(solution: Solution, misfit: Misfit, wider: float = 1.0) -> tuple[Prediction, ...]:
     """Return how each tooling's lines are predicted by the other ones; none where there is one tooling alone.
 
-    Parameters
-    ----------
-    solution : Solution
-        The whole answer.
-    misfit : Misfit
-        Whose minimum it is.
-    wider : float
-        Factor on all standard deviations.
+    `solution`: the whole answer
+    `misfit`: whose minimum it is
+    `wider`: factor on all standard deviations
     """
     data = misfit.data
     cuts = data.cut_tooling[: data.cuts]
@@ -86,16 +74,10 @@ def predictions(solution: Solution, misfit: Misfit, wider: float = 1.0) -> tuple
 def judged(solution: Solution, misfit: Misfit, whole: IdentificationData, wider: float = 1.0) -> tuple[Prediction, ...]:
     """Return how the cuts that were made to judge an answer are predicted, for each of their toolings.
 
-    Parameters
-    ----------
-    solution : Solution
-        The whole answer.
-    misfit : Misfit
-        Whose minimum it is.
-    whole : IdentificationData
-        The same cuts, and those that took no part.
-    wider : float
-        Factor on all standard deviations.
+    `solution`: the whole answer
+    `misfit`: whose minimum it is
+    `whole`: the same cuts, and those that took no part
+    `wider`: factor on all standard deviations
     """
     aside = whole.made.judged
     if not np.any(aside) or whole.tests:

@@ -44,14 +44,9 @@ def workpiece_side(
 ) -> tuple[WorkpieceSide | None, tuple[Remark, ...]]:
     """Return what gives way on the workpiece's side, and what to know of it; None where no accelerometer stands there.
 
-    Parameters
-    ----------
-    found : Identification
-        Of these cuts.
-    measurements : sequence of CutMeasurement
-        In its order.
-    sensors : sequence of Sensor
-        The campaign's.
+    `found`: of these cuts
+    `measurements`: in its order
+    `sensors`: the campaign's
     """
     channels = workpiece_channels(sensors)
     if channels is None or not found.axes:
@@ -87,14 +82,9 @@ def workpiece_side(
 class _Lines:
     """Lines of G_w along an axis.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-    value : complex array, shape (n,) [m/N]
-    variance : array, shape (n,) [m^2/N^2]
-        Of the real and of the imaginary part each.
-    open : complex array, shape (n, q) [-]
-        How their logarithms change with what is not known of delays and forces, per standard deviation.
+    `omega` [rad/s], shape (n,); `value` [m/N], shape (n,)
+    `variance` [m^2/N^2], shape (n,): of the real and of the imaginary part each
+    `open` [-], shape (n, q): how their logarithms change with what is not known of delays and forces, per standard deviation
     """
 
     omega: FloatArray

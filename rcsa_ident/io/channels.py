@@ -37,12 +37,8 @@ LARGEST_RATIO = 200
 class StoredChannel:
     """A channel that stays in its file: parts of it are read where they are asked for.
 
-    Parameters
-    ----------
-    size : int
-        Number of samples.
-    read : callable of (first, end)
-        Returns these samples, shape (end - first,).
+    `size`: number of samples
+    `read`: callable of (first, end); returns these samples, shape (end - first,)
     """
 
     size: int
@@ -63,15 +59,9 @@ Channel = FloatArray | StoredChannel
 class Signals(list[Channel]):
     """Channels of a recording with what the user should know of them.
 
-    Parameters
-    ----------
-    channels : sequence of Channel
-    notes : tuple of Remark
-    units : tuple of (str, Quantity or None)
-        The unit that the file says of each channel, and what it measures: samples of a known quantity are in SI already, those of a voltage
-        in volts. Empty where the file says none.
-    stored : tuple of str
-        The unit that the file says of each channel whose samples stand in it, not in SI. Empty where the file says none.
+    `units`: tuple of (str, Quantity or None). The unit that the file says of each channel, and what it measures: samples of a known
+        quantity are in SI already, those of a voltage in volts. Empty where the file says none.
+    `stored`: the unit that the file says of each channel whose samples stand in it, not in SI. Empty where the file says none.
     """
 
     def __init__(
@@ -140,16 +130,10 @@ def kept(channel: StoredChannel) -> Channel:
 def check_declared(samples: int, channels: int, size: int, where: str, largest: int = LARGEST_DATA) -> None:
     """Refuse what no file of `size` bytes holds, before memory is asked for it.
 
-    Parameters
-    ----------
-    samples, channels : int
-        Declared number of samples of each channel, and of channels.
-    size : int
-        Bytes of the file.
-    where : str
-        The file, for the messages.
-    largest : int
-        Bytes that are allowed, as float64.
+    `samples`, `channels`: declared number of samples of each channel, and of channels
+    `size`: bytes of the file
+    `where`: the file, for the messages
+    `largest`: bytes that are allowed, as float64
     """
     declared = 8 * samples * channels
     if declared > largest:
@@ -163,13 +147,8 @@ def check_declared(samples: int, channels: int, size: int, where: str, largest: 
 def the_only(name: str, present: Sequence[str], where: str) -> int:
     """Return the place of a channel; one that is missing or stands there twice is refused.
 
-    Parameters
-    ----------
-    name : str
-    present : sequence of str
-        Names of all channels, in the file's order.
-    where : str
-        The file, for the messages.
+    `present`: names of all channels, in the file's order
+    `where`: the file, for the messages
     """
     places = [i for i, each in enumerate(present) if each == name]
     if len(places) != 1:
@@ -181,13 +160,8 @@ def the_only(name: str, present: Sequence[str], where: str) -> int:
 def check_lengths(names: Sequence[str], lengths: Sequence[int], where: str) -> None:
     """Refuse channels of several lengths and channels without a sample.
 
-    Parameters
-    ----------
-    names : sequence of str
-    lengths : sequence of int
-        Number of samples of each.
-    where : str
-        The file, for the messages.
+    `lengths`: number of samples of each
+    `where`: the file, for the messages
     """
     for name, length in zip(names, lengths, strict=True):
         if length == 0:
@@ -200,13 +174,9 @@ def check_lengths(names: Sequence[str], lengths: Sequence[int], where: str) -> N
 def snapped(rate: float, spread: float, expected: float | None = None) -> float:
     """Return the rate that was meant: the campaign's or the roundest number of hertz within `spread`, relative, else the rate itself.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    spread : float [-]
-        Relative error that the file's digits leave.
-    expected : float or None [Hz]
-        The campaign's rate.
+    `rate` [Hz]
+    `spread` [-]: relative error that the file's digits leave
+    `expected` [Hz]: the campaign's rate
     """
     for candidate in (expected, *(round(rate / unit) * unit for unit in (100.0, 10.0, 1.0))):
         if candidate and abs(candidate / rate - 1.0) <= spread:
@@ -217,17 +187,10 @@ def snapped(rate: float, spread: float, expected: float | None = None) -> float:
 def placed(time: FloatArray, channels: Sequence[Channel], expected: float | None) -> tuple[float, list[Channel]]:
     """Return the rate [Hz] that times tell and the channels at their places; samples that the times skip are NaN.
 
-    Parameters
-    ----------
-    time : array, shape (n,) [s]
-    channels : sequence of Channel, shape (n,) each
-    expected : float or None [Hz]
-        The campaign's rate.
-
-    Raises
-    ------
-    Irregular
-        The times are no multiples of one step.
+    `time` [s], shape (n,)
+    `channels`: sequence of Channel, shape (n,) each
+    `expected` [Hz]: the campaign's rate
+    Raises `Irregular`: the times are no multiples of one step.
     """
     rate, index = uniform(time, expected)
     if index[-1] + 1 == index.size:
@@ -253,14 +216,9 @@ def time_scale(name: str) -> float | None:
 def lacks(what: str, package: str, extra: str, where: str) -> InputError:
     """Return the error of a format whose package is not installed.
 
-    Parameters
-    ----------
-    what : str
-        The file, in words.
-    package, extra : str
-        Package that reads it, and the extra of this one that brings it.
-    where : str
-        The file, for the messages.
+    `what`: the file, in words
+    `package`, `extra`: package that reads it, and the extra of this one that brings it
+    `where`: the file, for the messages
     """
     return InputError(
         "recording", f"{what}, and {package} is not installed", f'an installation with pip install "rcsa-ident[{extra}]"', where
@@ -270,13 +228,8 @@ def lacks(what: str, package: str, extra: str, where: str) -> InputError:
 def cannot_be_read(error: Exception, allowed: str, where: str) -> InputError:
     """Return one sentence for whatever a library raised on a broken file.
 
-    Parameters
-    ----------
-    error : Exception
-    allowed : str
-        What would have been read, in words.
-    where : str
-        The file, for the messages.
+    `allowed`: what would have been read, in words
+    `where`: the file, for the messages
     """
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         # a full disk is no fault of the file

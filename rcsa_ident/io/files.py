@@ -20,13 +20,8 @@ Bytes = bytes | mmap.mmap
 def existing_file(path: str | Path, field: str, largest: int) -> Path:
     """Return `path` if it is a regular file of at most `largest` bytes, else raise `InputError`.
 
-    Parameters
-    ----------
-    path : path
-    field : str
-        What the file is, for the message.
-    largest : int
-        Bytes that are allowed.
+    `field`: what the file is, for the message
+    `largest`: bytes that are allowed
     """
     path = Path(path)
     try:
@@ -46,13 +41,8 @@ def existing_file(path: str | Path, field: str, largest: int) -> Path:
 def read_bytes(path: str | Path, field: str, largest: int) -> bytes:
     """Return the file's bytes; a file that is missing, empty, too large or not readable raises `InputError`.
 
-    Parameters
-    ----------
-    path : path
-    field : str
-        What the file is, for the message.
-    largest : int
-        Bytes that are allowed.
+    `field`: what the file is, for the message
+    `largest`: bytes that are allowed
     """
     path = existing_file(path, field, largest)
     try:
@@ -64,13 +54,8 @@ def read_bytes(path: str | Path, field: str, largest: int) -> bytes:
 def mapped(path: str | Path, field: str, largest: int) -> Bytes:
     """Return the file's bytes as `read_bytes`, but none of them is in memory before it is looked at.
 
-    Parameters
-    ----------
-    path : path
-    field : str
-        What the file is, for the message.
-    largest : int
-        Bytes that are allowed.
+    `field`: what the file is, for the message
+    `largest`: bytes that are allowed
     """
     path = existing_file(path, field, largest)
     try:
@@ -101,17 +86,9 @@ def replacing(path: str | Path) -> Iterator[Path]:
 def filling(folder: str | Path, field: str = "output folder") -> Iterator[Path]:
     """Yield a temporary folder; at the end what is in it goes into `folder`, after an error it is gone and `folder` as it was.
 
-    Parameters
-    ----------
-    folder : path
-        Made with the folders around it if it is missing; its files of the same names are replaced.
-    field : str
-        What the folder is, for the message.
-
-    Raises
-    ------
-    InputError
-        Before anything is computed where nothing could be written.
+    `folder`: made with the folders around it if it is missing; its files of the same names are replaced
+    `field`: what the folder is, for the message
+    Raises `InputError` before anything is computed where nothing could be written.
     """
     folder = Path(folder).absolute()
     # the folders around it are made at the end, too

@@ -28,18 +28,10 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 class TextTable:
     """Lines of a text table, split no further than needed.
 
-    Parameters
-    ----------
-    where : str
-        The file.
-    header : tuple of str
-    delimiter : str
-    lines : list of str
-        Without header and empty lines; the decimal sign is a point.
-    numbers : list of int
-        Line number of each, from 1, as an editor counts.
-    unread : list of str
-        Columns that nobody has asked for yet.
+    `where`: the file
+    `lines`: without header and empty lines; the decimal sign is a point
+    `numbers`: line number of each, from 1, as an editor counts
+    `unread`: columns that nobody has asked for yet
     """
 
     where: str
@@ -63,10 +55,7 @@ class TextTable:
     def columns(self, names: Sequence[str]) -> list[FloatArray]:
         """Return the named columns, shape (n,) each; an empty cell is NaN.
 
-        Raises
-        ------
-        InputError
-            A cell is no number; the message names its line and column.
+        Raises `InputError`: a cell is no number; the message names its line and column.
         """
         if not self.lines:  # a part of a long file that is empty lines alone
             return [np.empty(0) for _ in names]
@@ -105,13 +94,8 @@ def read_table(path: str | Path, field: str, largest: int = LARGEST_TEXT) -> Tex
 
     Lines that start with # in front of the header are comments. With semicolons or tabs the decimal sign may be a comma.
 
-    Parameters
-    ----------
-    path : path
-    field : str
-        What the file is, for the message.
-    largest : int
-        Bytes that are allowed.
+    `field`: what the file is, for the message
+    `largest`: bytes that are allowed
     """
     return table_of(decoded(read_bytes(path, field, largest), field, str(path)), field, str(path))
 
@@ -125,10 +109,7 @@ def table_of(text: str, field: str, where: str) -> TextTable:
 class _Parts:
     """A table that comes in parts, each of whole lines; the first one has the header.
 
-    Parameters
-    ----------
-    field, where : str
-        What the file is, and the file, for the messages.
+    `field`, `where`: what the file is, and the file, for the messages
     """
 
     def __init__(self, field: str, where: str) -> None:
@@ -220,14 +201,9 @@ def _blocks(path: Path, field: str, largest: int) -> Iterator[bytes]:
 class Meant(NamedTuple):
     """Which columns of a header are meant.
 
-    Parameters
-    ----------
-    time : tuple of str
-        The column of times, if there is one.
-    seconds : float
-        Its unit in seconds.
-    channels : tuple of str
-        Names in the header.
+    `time`: the column of times, if there is one
+    `seconds`: its unit in seconds
+    `channels`: names in the header
     """
 
     time: tuple[str, ...]
@@ -240,13 +216,8 @@ def read_channels(path: Path, meant: Callable[[tuple[str, ...]], Meant], default
 
     The rate comes from the column of times, else from the campaign. Samples that the times skip are NaN.
 
-    Parameters
-    ----------
-    path : path
-    meant : callable
-        Says of the header which columns are read.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
+    `meant`: says of the header which columns are read
+    `default_rate` [Hz]: for a file that carries no rate
     """
     where = str(path)
     parts = _Parts("recording", where)

@@ -65,16 +65,10 @@ RATES_ALLOWED = f"a number in {UNITS_OF_RATES}, or of a sampling interval in s, 
 class Head:
     """What stands above the numbers.
 
-    Parameters
-    ----------
-    texts : list of str
-        Cells of the line of names, as they stand.
-    names, units : list of str
-        Of the columns; the unit is empty where none is told.
-    named : bool
-        Whether a line names the columns; they are counted otherwise.
-    rates : list of float [Hz]
-        What the lines tell, the first one first, none twice.
+    `texts`: cells of the line of names, as they stand
+    `names`, `units`: of the columns; the unit is empty where none is told
+    `named`: whether a line names the columns; they are counted otherwise
+    `rates`: list of float [Hz], what the lines tell, the first one first, none twice
     """
 
     texts: list[str]
@@ -100,26 +94,13 @@ def read_head(
 ) -> Head:
     """Return names and units of a table's columns, and the rates, from the lines above its numbers.
 
-    Parameters
-    ----------
-    above : sequence of str
-    delimiter : str
-        Empty for blanks.
-    comma : bool
-        Whether the decimal sign of the table is a comma.
-    width : int
-        Columns of the table.
-    wanted : sequence of str
-        Names that tell the line of names where nothing else does.
-    expected : float or None [Hz]
-        The campaign's rate, which decides between those that an interval's digits leave open.
-    where : str
-        The file, for the messages.
-
-    Raises
-    ------
-    InputError
-        A line of names has another number of cells than the numbers below, or a rate is told in a unit that is not known.
+    `delimiter`: empty for blanks
+    `comma`: whether the decimal sign of the table is a comma
+    `width`: columns of the table
+    `wanted`: names that tell the line of names where nothing else does
+    `expected` [Hz]: the campaign's rate, which decides between those that an interval's digits leave open
+    `where`: the file, for the messages
+    Raises `InputError`: a line of names has another number of cells than the numbers below, or a rate is told in a unit that is not known.
     """
     lines = [line.lstrip("# \t" if delimiter != "\t" else "# ") for line in above]
     rows = [row for line in lines if any(row := split(line, delimiter))]

@@ -46,16 +46,9 @@ class Irregular(Exception):
 def uniform(time: FloatArray, expected: float | None = None) -> tuple[float, np.ndarray]:
     """Return the rate [Hz] and the index of each sample, shape (n,), from times that were rounded when written.
 
-    Parameters
-    ----------
-    time : array, shape (n,) [s]
-    expected : float or None [Hz]
-        Taken as it is where the times agree with it within their rounding; so is the roundest number of hertz that they allow.
-
-    Raises
-    ------
-    Irregular
-        Names the row where a time is missing, does not rise or stands between two steps.
+    `time` [s], shape (n,)
+    `expected` [Hz]: taken as it is where the times agree with it within their rounding; so is the roundest number of hertz that they allow
+    Raises `Irregular`, which names the row where a time is missing, does not rise or stands between two steps.
     """
     if time.size < 2:
         raise Irregular(0, f"{time.size} samples", "at least two times, which give the sampling interval")

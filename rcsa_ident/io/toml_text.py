@@ -33,18 +33,9 @@ def read_toml(path: str | Path, field: str) -> dict[str, Any]:
 def keys_of_toml(text: str, field: str, where: str = "") -> dict[str, Any]:
     """Return the keys of a TOML text.
 
-    Parameters
-    ----------
-    text : str
-    field : str
-        What the text is, for the message.
-    where : str
-        Its file, for the message.
-
-    Raises
-    ------
-    InputError
-        Names line and column.
+    `field`: what the text is, for the message
+    `where`: its file, for the message
+    Raises `InputError`, which names line and column.
     """
     place, allowed = "", "TOML"
     try:
@@ -67,14 +58,9 @@ def keys_of_toml(text: str, field: str, where: str = "") -> dict[str, Any]:
 def toml_of(keys: Mapping[str, Any], remarks: Sequence[str] = (), digits: int | None = None) -> str:
     """Return keys as TOML that reads back the same.
 
-    Parameters
-    ----------
-    keys : mapping
-        Texts, numbers, lists and mappings.
-    remarks : sequence of str
-        Comments in front, a line each.
-    digits : int, optional
-        Significant digits of floats; all of them where none is given.
+    `keys`: texts, numbers, lists and mappings
+    `remarks`: comments in front, a line each
+    `digits`: significant digits of floats; all of them where none is given
 
     Examples
     --------

@@ -45,27 +45,15 @@ class UffAxis:
 class UffFunction:
     """A function of one dataset 58.
 
-    Parameters
-    ----------
-    kind : int
-        One of `KINDS`.
-    abscissa : array, shape (n,)
-    values : array, shape (n,)
-        Real or complex.
-    response, reference : (int, int)
-        Node and direction: 0 none, 1 to 3 the axes X to Z, negative against them, beyond 3 rotations.
-    abscissa_axis, ordinate, denominator : UffAxis
-    title : str
-    factors : (float, float)
-        The file's units of length and force in one SI unit (dataset 164).
-    where : str
-        File and line.
-    names : tuple of str
-        What the file calls the function, the most particular first: response entity, label of the ordinate, title, place as ``3:-X``.
-    step : float
-        Of an even abscissa, as the header rounds it to six digits; 0 where the abscissa stands in the file point by point.
-    system : bool
-        Whether the file states its system of units (dataset 164).
+    `kind`: one of `KINDS`
+    `abscissa`, shape (n,)
+    `values`, shape (n,): real or complex
+    `response`, `reference`: (int, int); node and direction: 0 none, 1 to 3 the axes X to Z, negative against them, beyond 3 rotations
+    `factors`: (float, float); the file's units of length and force in one SI unit (dataset 164)
+    `where`: file and line
+    `names`: what the file calls the function, the most particular first: response entity, label of the ordinate, title, place as ``3:-X``
+    `step`: of an even abscissa, as the header rounds it to six digits; 0 where the abscissa stands in the file point by point
+    `system`: whether the file states its system of units (dataset 164)
     """
 
     kind: int
@@ -93,10 +81,7 @@ class UffFunction:
 def read_uff(path: str | Path) -> list[UffFunction]:
     """Return the functions of a universal file; datasets other than 58 and the units of 164 are passed over.
 
-    Raises
-    ------
-    InputError
-        Names the file, the line, what was found and what is allowed.
+    Raises `InputError`, which names the file, the line, what was found and what is allowed.
     """
     lines = _Lines(read_bytes(path, "universal file", LARGEST_UFF), str(path))
     found: list[UffFunction] = []

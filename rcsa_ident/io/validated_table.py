@@ -23,18 +23,10 @@ _MOMENT = r"^\d{4}-[01]\d-[0-3]\dT[0-2]\d:[0-5]\d(:[0-5]\d(\.\d+)?)?(Z|[+-]\d\d:
 class Asked:
     """What a reader asked of one table, for who describes the file.
 
-    Parameters
-    ----------
-    data : mapping
-        The table.
-    path : str
-        As `Table` has it.
-    known : collection of str or None
-    keys : dict
-        JSON Schema of what may stand under a key; tables by the path of theirs, under ``table``.
-    required : set of str
-    one_of : list of tuple of str
-        Keys of which exactly one is there.
+    `data`: the table
+    `path`: as `Table` has it
+    `keys`: JSON Schema of what may stand under a key; tables by the path of theirs, under ``table``
+    `one_of`: keys of which exactly one is there
     """
 
     data: Mapping[str, Any]
@@ -101,29 +93,14 @@ class Table:
         return f"{self.path}.{key}" if self.path else key
 
     def refuse(self, key: str, found: object, allowed: str) -> NoReturn:
-        """Raise the error that names a key of this table.
-
-        Parameters
-        ----------
-        key : str
-        found : object
-            What stands there.
-        allowed : str
-            What could, in words.
-        """
+        """Raise the error that names a key of this table. `found`: what stands there. `allowed`: what could, in words."""
         raise InputError(self.name(key), found, allowed, self.where)
 
     def value(self, key: str, allowed: str, default: Any = NEEDED, schema: Mapping[str, Any] | None = None) -> Any:
         """Return what stands under `key`; without a default the key must be there.
 
-        Parameters
-        ----------
-        key : str
-        allowed : str
-            What could stand there, in words.
-        default : object, optional
-        schema : mapping, optional
-            The same in JSON Schema.
+        `allowed`: what could stand there, in words
+        `schema`: the same in JSON Schema
         """
         if self._asked is not None:
             usual = {"default": default} if isinstance(default, str | int | float) else {}
@@ -148,15 +125,8 @@ class Table:
     ) -> Any:
         """Return a finite number within its range, as int if `whole`, else as float; a default is returned unchecked.
 
-        Parameters
-        ----------
-        key : str
-        unit : str
-            For the message.
-        default : object, optional
-        above, least, most : float, optional
-            Limits: `above` is not allowed itself, the others are.
-        whole : bool
+        `unit`: for the message
+        `above`, `least`, `most`: limits: `above` is not allowed itself, the others are
         """
         limits = [f"above {above:g}" if above is not None else "", f"at least {least:g}" if least is not None else ""]
         limits = [*(text for text in limits if text), *([f"at most {most:g}"] if most is not None else [])]
@@ -178,14 +148,7 @@ class Table:
         return int(number) if whole else number
 
     def quantity(self, key: str, kind: Range, default: Any = NEEDED) -> Any:
-        """Return a number in its own unit that is possible for a quantity; a default is returned unchecked.
-
-        Parameters
-        ----------
-        key : str
-        kind : Range
-        default : object, optional
-        """
+        """Return a number in its own unit that is possible for a quantity; a default is returned unchecked."""
         value = self.number(key, kind.unit, default)
         if self._asked is not None:
             words = f"Usual are {kind.usual[0]:g} to {kind.usual[1]:g}"
@@ -200,17 +163,7 @@ class Table:
         return value
 
     def number_or(self, key: str, names: Collection[str], what: str, unit: str, least: float, most: float) -> str | float:
-        """Return one of `names`, or a number from `least` to `most`.
-
-        Parameters
-        ----------
-        key : str
-        names : collection of str
-        what : str
-            The number in words, for the message.
-        unit : str
-        least, most : float
-        """
+        """Return one of `names`, or a number from `least` to `most`. `what`: the number in words, for the message."""
         allowed = f"one of {', '.join(names)}, or {what} from {least:g} to {most:g} [{unit}]"
         edges = {"minimum": least, "maximum": most}
         value = self.value(key, allowed, schema={"anyOf": [{"enum": list(names)}, _number_schema(unit, edges)], "description": allowed})
@@ -254,14 +207,8 @@ class Table:
     ) -> list[float]:
         """Return a list of `count` finite numbers (any number of them if None).
 
-        Parameters
-        ----------
-        key : str
-        count : int or None
-        unit : str
-            For the message.
-        above, least : float, optional
-            Limits of each: `above` is not allowed itself, `least` is.
+        `unit`: for the message
+        `above`, `least`: limits of each: `above` is not allowed itself, `least` is
         """
         limit = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
         allowed = f"a list of {'finite' if count is None else f'{count} finite'} numbers{limit}" + (f" [{unit}]" if unit else "")
@@ -281,15 +228,8 @@ class Table:
     def text(self, key: str, default: Any = NEEDED, choices: Collection[str] = (), allowed: str = "a text", names_of: str = "") -> Any:
         """Return a non-empty text, one of `choices` if there are any; a default is returned unchecked.
 
-        Parameters
-        ----------
-        key : str
-        default : object, optional
-        choices : collection of str
-        allowed : str
-            What could stand there, in words, where there are no choices.
-        names_of : str
-            Table of the file whose keys are choices, where there is one.
+        `allowed`: what could stand there, in words, where there are no choices
+        `names_of`: table of the file whose keys are choices, where there is one
         """
         allowed = f"one of {', '.join(choices)}" if choices else allowed
         schema: dict[str, Any] = {"type": "string", "pattern": r"\S"}
@@ -316,15 +256,7 @@ class Table:
         return list(found)
 
     def table(self, key: str, known: Collection[str] | None = None, default: Any = NEEDED) -> Table:
-        """Return the table under `key`.
-
-        Parameters
-        ----------
-        key : str
-        known : collection of str, optional
-            Keys that the table may have; by default any.
-        default : mapping, optional
-        """
+        """Return the table under `key`. `known`: keys that the table may have; by default any."""
         return Table(self.value(key, f"a table [{self.name(key)}]", default, {"table": self.name(key)}), self.where, self.name(key), known)
 
     def tables(self, key: str, known: Collection[str] | None = None) -> list[Table]:
@@ -338,12 +270,7 @@ class Table:
     def named_tables(self, key: str, known: Collection[str] | None = None, default: Any = NEEDED) -> dict[str, Table]:
         """Return the tables below `key` by their own names.
 
-        Parameters
-        ----------
-        key : str
-        known : collection of str, optional
-            Keys that each of them may have; by default any.
-        default : mapping, optional
+        `known`: keys that each of them may have; by default any
         """
         outer = self.table(key, None, default)
         return {name: Table(item, self.where, outer.name(name), known) for name, item in outer.data.items()}
@@ -365,13 +292,7 @@ class Table:
                 return self.flag(field.key, field.default) if kind is bool else self.text(field.key, field.default)
 
     def fields(self, fields: Iterable[Field], defaults: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Return what stands under declared keys, in their units; `defaults` count before those that are declared.
-
-        Parameters
-        ----------
-        fields : iterable of Field
-        defaults : mapping, optional
-        """
+        """Return what stands under declared keys, in their units; `defaults` count before those that are declared."""
         usual = defaults or {}
         return {each.key: self.field(replace(each, default=usual.get(each.key, each.default))) for each in fields}
 

@@ -31,14 +31,9 @@ _SHORT_BELOW, _SHORT_ABOVE = 0.8, 1.05
 class AxialFlange(Shown):
     """The receptance of machine and spindle at the flange along the axis, with the joint's compliance in it, as poles.
 
-    Parameters
-    ----------
-    modes : PoleResidue
-        Of one input and one output [m/N].
-    band : (float, float) [rad/s]
-        Lowest and highest frequency at which it was measured; beyond it the poles answer.
-    tooling : str
-        That was tapped; empty where nobody knows.
+    `modes`: of one input and one output [m/N]
+    `band`: (float, float) [rad/s]; lowest and highest frequency at which it was measured; beyond it the poles answer
+    `tooling`: that was tapped; empty where nobody knows
     """
 
     modes: PoleResidue
@@ -55,15 +50,10 @@ class AxialFlange(Shown):
     def fitted(cls, omega: FloatArray, values: ComplexArray, noise: FloatArray | None = None, tooling: str = "") -> Self:
         """Return the poles of a measured or decoupled receptance.
 
-        Parameters
-        ----------
-        omega : array, shape (n,) [rad/s]
-            Rising, above 0.
-        values : complex array, shape (n,) [m/N]
-        noise : array, shape (n,), optional
-            Standard deviation of the real and of the imaginary part each.
-        tooling : str
-            That was tapped.
+        `omega` [rad/s], shape (n,): rising, above 0
+        `values` [m/N], shape (n,)
+        `noise`, shape (n,): standard deviation of the real and of the imaginary part each
+        `tooling`: that was tapped
         """
         if omega.size < 8 or not np.all(np.diff(omega) > 0.0) or omega[0] <= 0.0:
             raise InputError("axial frequencies", f"{omega.size} of them", "at least 8 that rise, above 0 [rad/s]")
@@ -90,10 +80,7 @@ class AxialFlange(Shown):
     def remarks(self, band: tuple[float, float] | None) -> tuple[str, ...]:
         """Return what speaks against it: a flange that feeds energy in, or one that was tapped over less than the machine's band.
 
-        Parameters
-        ----------
-        band : (float, float) or None [rad/s]
-            At which the machine is known.
+        `band`: (float, float) or None [rad/s]; at which the machine is known
         """
         told = []
         low, high = (to_hz(w) for w in self.band)

@@ -24,12 +24,8 @@ from rcsa_ident.dynamics.receptance import Receptance, Substructure
 class JointedFlange:
     """A flange and the joint in front of it.
 
-    Parameters
-    ----------
-    flange : Substructure
-        Coordinates at ``flange``.
-    joint : LumpedJoint or None
-        None where the flange's receptance holds the joint's compliance already.
+    `flange`: coordinates at ``flange``
+    `joint`: None where the flange's receptance holds the joint's compliance already
     """
 
     flange: Substructure
@@ -49,11 +45,7 @@ class JointedFlange:
 class Perturbation:
     """Two candidates on both sides of the believed one, along a direction that is independent of the others.
 
-    Parameters
-    ----------
-    ahead, behind : JointedFlange
-    weight : float
-        One standard deviation over the distance of both.
+    `weight`: one standard deviation over the distance of both
     """
 
     ahead: JointedFlange
@@ -65,15 +57,9 @@ class Perturbation:
 class Doubt:
     """What is not known of a candidate.
 
-    Parameters
-    ----------
-    steps : sequence of Perturbation
-    rivals : sequence of JointedFlange
-        Other models of the same data: how far each differs is one more direction.
-    shifts : array, shape (steps + rivals, u)
-        How far what is known of toolings, in its own units, moves with each of them.
-    left : array, shape (u, u)
-        Covariance of what is known of toolings, the machine given.
+    `rivals`: other models of the same data: how far each differs is one more direction
+    `shifts`, shape (steps + rivals, u): how far what is known of toolings, in its own units, moves with each of them
+    `left`, shape (u, u): covariance of what is known of toolings, the machine given
     """
 
     steps: Sequence[Perturbation] = ()
@@ -94,11 +80,7 @@ class Doubtful(Protocol):
 class OpenQuestion:
     """What a posterior leaves open, worked out when it is asked for; another process works it out for itself.
 
-    Parameters
-    ----------
-    posterior : Doubtful
-    question : tuple
-        What its `doubt` is asked.
+    `question`: what its `doubt` is asked
     """
 
     posterior: Doubtful
@@ -121,13 +103,8 @@ class OpenQuestion:
 class FlangePart:
     """Directions of the flange that feel each other, and none beside them: one bending plane, or both.
 
-    Parameters
-    ----------
-    coordinates : tuple of Coordinate, length b
-        Translation and slope, plane by plane.
-    believed : JointedFlange
-    doubt : callable, returns Doubt; or None
-        Asked only where a spread is wanted. None where the candidate is taken for exact.
+    `coordinates`: tuple of Coordinate, length b; translation and slope, plane by plane
+    `doubt`: callable, returns Doubt; or None. Asked only where a spread is wanted. None where the candidate is taken for exact.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -137,10 +114,7 @@ class FlangePart:
     def response(self, respond: Callable[[JointedFlange], ComplexArray]) -> tuple[ComplexArray, ComplexArray | None]:
         """Return what the believed candidate responds, shape (n, ...), and its changes along all directions, shape (p, n, ...).
 
-        Parameters
-        ----------
-        respond : callable
-            JointedFlange to complex array.
+        `respond`: JointedFlange to complex array
         """
         here = respond(self.believed)
         if self.doubt is None:
@@ -154,10 +128,7 @@ class FlangePart:
 def independent_parts(flange: Receptance) -> list[tuple[Coordinate, ...]]:
     """Return the coordinates of each group that feels nothing of the others: bending planes without cross terms stand apart.
 
-    Raises
-    ------
-    InputError
-        If a bending plane is not known by translation and slope, or something else is.
+    Raises `InputError` if a bending plane is not known by translation and slope, or something else is.
     """
     axes = dict.fromkeys(c.dof.plane for c in flange.rows)
     planes: list[tuple[Coordinate, ...]] = [plane("flange", axis) for axis in axes if axis is not Dof.Z]

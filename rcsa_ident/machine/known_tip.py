@@ -158,14 +158,7 @@ def _drifts(tip: Receptance) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MeasuredTip(Receptance):
-    """A tip's receptance from files, and what their readers assumed.
-
-    Parameters
-    ----------
-    omega, values, rows, cols
-        As of a `Receptance`.
-    assumed : tuple of Remark
-    """
+    """A tip's receptance from files, and what their readers assumed. `omega`, `values`, `rows`, `cols`: as of a `Receptance`."""
 
     assumed: tuple[Remark, ...] = ()
 
@@ -179,12 +172,9 @@ def measured_tip(
 ) -> MeasuredTip:
     """Return the tip's receptance of measured FRFs, over X and Y, and over Z where it is there.
 
-    Parameters
-    ----------
-    curves : mapping of Dof to (frequency [Hz], values [m/N])
-        A direction that is missing is rigid.
-    cross : mapping of (response, force) to (frequency [Hz], values [m/N]), optional
-        Of two directions that are both there; one of the two stands for the other, too, as Maxwell's reciprocity has it.
+    `curves`: mapping of Dof to (frequency [Hz], values [m/N]); a direction that is missing is rigid
+    `cross`: mapping of (response, force) to (frequency [Hz], values [m/N]); of two directions that are both there; one of the two stands
+        for the other, too, as Maxwell's reciprocity has it
     """
     planes = {}
     for axis, (frequency, values) in curves.items():

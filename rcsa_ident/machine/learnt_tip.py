@@ -31,17 +31,9 @@ THIN = "only {:.0f} of the draws agree with the labels, fewer than {:.0f}: proba
 class LearntTip(TipSource):
     """What is believed of a tooling's tip after labelled cuts, or before the first of them; it answers for that tooling alone.
 
-    Parameters
-    ----------
-    prior : UncertainTip
-    coefficients : CuttingCoefficients
-        Means before the labels.
-    method : StabilityMethod
-        That the limits were computed by: their error is that method's, too, so that no other one takes its place.
-    model : LabelModel
-    cuts : TestedCuts
-        Those that were learnt from.
-    posterior : LabelPosterior
+    `coefficients`: means before the labels
+    `method`: that the limits were computed by: their error is that method's, too, so that no other one takes its place
+    `cuts`: those that were learnt from
     """
 
     prior: UncertainTip
@@ -105,15 +97,10 @@ class LearntTip(TipSource):
     def limits(self, process: MillingProcess, speeds: FloatArray, max_depth: float, draws: int) -> StabilityLobes:
         """Return the limits up to which one half of the draws is stable, and those of each draw.
 
-        Parameters
-        ----------
-        process : MillingProcess
-            With the coefficients' means.
-        speeds : array, shape (n,) [rad/s]
-            Rising.
-        max_depth : float [m]
-        draws : int
-            At most so many of the draws, and one at least.
+        `process`: with the coefficients' means
+        `speeds` [rad/s], shape (n,): rising
+        `max_depth` [m]
+        `draws`: at most so many of the draws, and one at least
         """
         # an error may bring a limit back from beyond the largest depth
         deeper = max_depth * float(np.exp(2.0 * self.model.discrepancy.deviation))

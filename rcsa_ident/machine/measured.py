@@ -157,13 +157,9 @@ def translations_only(omega: FloatArray, values: ComplexArray, axis: Dof = Dof.X
     A flange that does not turn is the usual assumption where rotations cannot be measured; it makes the coupled machine stiffer than
     it is. Decoupling (several toolings) or neighbouring points (finite differences) give the rotations.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-    values : complex array, shape (n,) [m/N]
-        Displacement per force of the flange.
-    axis : Dof
-        Machine axis X or Y: the bending plane.
+    `omega` [rad/s], shape (n,)
+    `values` [m/N], shape (n,): displacement per force of the flange
+    `axis`: machine axis X or Y: the bending plane
     """
     block = np.zeros((np.size(omega), 2, 2), dtype=complex)
     block[:, 0, 0] = frozen(values, np.complex128)

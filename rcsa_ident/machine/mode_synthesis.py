@@ -97,17 +97,10 @@ def poles_of(
 ) -> PoleResidue | None:
     """Return the same of a flange and the joint in front of it, or None where it does not stand in modes.
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    believed : JointedFlange
-        Of both bending planes, or of all six directions.
-    highest : float [rad/s]
-        Up to which the tip is asked for.
-    turning : float or None [rad/s]
-        Spindle speed of the tool-holder's gyroscopic moments; None leaves them out.
-    slopes : bool
-        As in `synthesised_poles`.
+    `believed`: of both bending planes, or of all six directions
+    `highest` [rad/s]: up to which the tip is asked for
+    `turning` [rad/s]: spindle speed of the tool-holder's gyroscopic moments; None leaves them out
+    `slopes`: as in `synthesised_poles`
     """
     flange = believed.flange
     if not isinstance(flange, TurningModes) or flange.coordinates not in (FLANGE, WHOLE_FLANGE):

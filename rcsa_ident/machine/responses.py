@@ -24,14 +24,9 @@ _SLOPES = {Dof.X: Dof.SLOPE_X, Dof.Y: Dof.SLOPE_Y}
 def respond_over(parts: Sequence[FlangePart], omega: FloatArray, respond: Respond, holder: Receptance | None = None) -> UncertainReceptance:
     """Return what all parts respond, with zeros between them.
 
-    Parameters
-    ----------
-    parts : sequence of FlangePart
-    omega : array, shape (n,) [rad/s]
-    respond : callable
-        A candidate, its share of the tool-holder and frequencies to a receptance: `at_flange` or `at_ends`.
-    holder : Receptance or None
-        Free tool-holder in one bending plane, or in both where they feel each other.
+    `omega` [rad/s], shape (n,)
+    `respond`: a candidate, its share of the tool-holder and frequencies to a receptance: `at_flange` or `at_ends`
+    `holder`: free tool-holder in one bending plane, or in both where they feel each other
     """
     each = [PartResponse(part, respond, None if holder is None else in_planes(holder, part), omega) for part in parts]
     whole = Receptance.block_diagonal([part.nominal for part in each])

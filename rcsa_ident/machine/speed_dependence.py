@@ -39,20 +39,11 @@ def tips_over_speed(
 
     Blocks that lie far apart come first.
 
-    Parameters
-    ----------
-    machine : TipSource
-    tooling : Tooling or ToolAssembly
-    omega : array, shape (k,) [rad/s]
-        Of the receptances.
-    speeds : array, shape (n,) [rad/s]
-        In any order; each is in one block.
-    spread : bool
-        With what is not known of the machine.
-    stiffness_spread : float
-        Standard deviation of the tool-holder's stiffness, as a share.
-    directions : sequence of Coordinate
-        Of the tip, as `Machine.tip` takes them.
+    `omega` [rad/s], shape (k,): of the receptances
+    `speeds` [rad/s], shape (n,): in any order; each is in one block
+    `spread`: with what is not known of the machine
+    `stiffness_spread`: standard deviation of the tool-holder's stiffness, as a share
+    `directions`: of the tip, as `Machine.tip` takes them
     """
 
     def tip_of(model: TipSource, spread: bool) -> UncertainReceptance | TipModes:

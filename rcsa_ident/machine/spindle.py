@@ -12,13 +12,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 
 @dataclass(frozen=True, slots=True)
 class Spindle:
-    """Modes of machine and spindle at the flange, in one bending plane.
-
-    Parameters
-    ----------
-    modes : ModalModel
-        Coordinates ``flange`` translation and slope.
-    """
+    """Modes of machine and spindle at the flange, in one bending plane. `modes`: coordinates ``flange`` translation and slope."""
 
     modes: ModalModel
 

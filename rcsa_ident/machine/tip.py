@@ -54,10 +54,8 @@ def _none() -> ComplexArray:
 class Ends:
     """W at both ends of each step of a part, as the kernels read them.
 
-    Parameters
-    ----------
-    ahead, behind : complex arrays, shape (n, p, 3) for one plane, (p, n, b, b) for planes that feel each other
-        One plane: translation, both, slope; asked for at some frequencies, all directions of each, so they stand together in memory.
+    `ahead`, `behind`: complex arrays, shape (n, p, 3) for one plane, (p, n, b, b) for planes that feel each other; one plane: translation,
+        both, slope; asked for at some frequencies, all directions of each, so they stand together in memory
     """
 
     ahead: ComplexArray
@@ -68,14 +66,9 @@ class Ends:
 class Side:
     """One part of a machine behind the flange, at frequencies that many toolings share.
 
-    Parameters
-    ----------
-    part : FlangePart
-    omega : array, shape (n,) [rad/s]
-    nominal : complex array, shape (n, b, b)
-        W of what is believed.
-    ends : Ends or None
-        At all frequencies where it is kept, else computed for each question.
+    `omega` [rad/s], shape (n,)
+    `nominal`, shape (n, b, b): W of what is believed
+    `ends`: at all frequencies where it is kept, else computed for each question
     """
 
     part: FlangePart
@@ -157,10 +150,8 @@ def _planes(w: ComplexArray) -> ComplexArray:
 class Holder:
     """A tool-holder's free receptances between tip and flange, as a part of the machine needs them.
 
-    Parameters
-    ----------
-    blocks : complex arrays, shapes (n, a, a), (n, a, b), (n, b, a), (n, b, b)
-        A11, A12, A21, A22 over a directions of the tip and b of the flange.
+    `blocks`: complex arrays, shapes (n, a, a), (n, a, b), (n, b, a), (n, b, b); A11, A12, A21, A22 over a directions of the tip and b of
+        the flange
     """
 
     blocks: tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]
@@ -190,11 +181,8 @@ class Holder:
 class PlaneHolder:
     """The same of one bending plane and the tip's translation alone, in closed form.
 
-    Parameters
-    ----------
-    tip_tip : complex array, shape (n,)
-    flange, carried : complex arrays, shape (3, n)
-        As `rcsa_ident.machine._kernels.tips_over` takes them.
+    `tip_tip`, shape (n,)
+    `flange`, `carried`, shape (3, n): as `rcsa_ident.machine._kernels.tips_over` takes them
     """
 
     tip_tip: ComplexArray
@@ -234,13 +222,9 @@ class PlaneHolder:
 class Behind:
     """What stands behind a tool-holder, and which directions of its tip are asked for.
 
-    Parameters
-    ----------
-    sides : tuple of Side
-    turning : float or None [rad/s]
-        Spindle speed of the tool-holder's gyroscopic moments, which couple the planes: both are one part then. None leaves them out.
-    slopes : bool
-        The tip's slopes beside its translations.
+    `turning` [rad/s]: spindle speed of the tool-holder's gyroscopic moments, which couple the planes: both are one part then. None leaves
+        them out.
+    `slopes`: the tip's slopes beside its translations
     """
 
     sides: tuple[Side, ...]
@@ -250,12 +234,8 @@ class Behind:
     def holders(self, assembly: ToolAssembly, omega: FloatArray, highest: float | None = None) -> tuple[Holder | PlaneHolder, ...]:
         """Return a tool-holder at some frequencies as each part needs it.
 
-        Parameters
-        ----------
-        assembly : ToolAssembly
-        omega : array, shape (n,) [rad/s]
-        highest : float or None [rad/s]
-            Frequency up to which mesh and modes are good; that of `omega` by default.
+        `omega` [rad/s], shape (n,)
+        `highest` [rad/s]: frequency up to which mesh and modes are good; that of `omega` by default
         """
         made: dict[int, Holder | PlaneHolder] = {}
         highest = float(omega[-1]) if highest is None else highest
@@ -348,15 +328,8 @@ def _turning_holder(assembly: ToolAssembly, omega: FloatArray, speed: float, sid
 class TipSpread:
     """How a tip varies: with the machine's steps and rivals, with what its drawing leaves open, and with the tool-holder's stiffness.
 
-    Parameters
-    ----------
-    behind : Behind
-    members : tuple of (tuple of int), one for each part
-        Where its directions stand in the tip's receptance.
-    holders : tuple of Holder or PlaneHolder
-    drawing : FittedDrawing
-    stiffness_spread : float
-        Standard deviation of the tool-holder's stiffness, as a share.
+    `members`: tuple of (tuple of int), one for each part; where its directions stand in the tip's receptance
+    `stiffness_spread`: standard deviation of the tool-holder's stiffness, as a share
     """
 
     behind: Behind
@@ -444,13 +417,8 @@ class TipSpread:
 def tip_over(behind: Behind, drawing: FittedDrawing, stiffness_spread: float) -> UncertainReceptance:
     """Return the tip's receptance of a tooling on a machine, with its spread where something is not known.
 
-    Parameters
-    ----------
-    behind : Behind
-        All parts of the machine, at the same frequencies.
-    drawing : FittedDrawing
-    stiffness_spread : float
-        Standard deviation of the tool-holder's stiffness, as a share.
+    `behind`: all parts of the machine, at the same frequencies
+    `stiffness_spread`: standard deviation of the tool-holder's stiffness, as a share
     """
     omega = behind.sides[0].omega
     holders = behind.holders(drawing.assembly, omega)

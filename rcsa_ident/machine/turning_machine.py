@@ -21,19 +21,11 @@ from rcsa_ident.machine.mode_synthesis import FLANGE
 class TurningMachine(Machine):
     """A machine as modes at its flange that turn with the spindle, and with them the tool-holders on it; taken for exact.
 
-    Parameters
-    ----------
-    modes : TurningModes
-        Over `FLANGE`, at the speed at which the machine stands.
-    known : (float, float) [rad/s]
-        Lowest and highest frequency at which it is known.
-    speeds : (float, float) [rad/s]
-        Lowest and highest spindle speed at which it is known.
-    joint : LumpedJoint or None
-        None where the modes hold the joint's compliance.
-    name : str
-    axial : AxialFlange or None
-        What an axial tap showed.
+    `modes`: over `FLANGE`, at the speed at which the machine stands
+    `known`: (float, float) [rad/s]; lowest and highest frequency at which it is known
+    `speeds`: (float, float) [rad/s]; lowest and highest spindle speed at which it is known
+    `joint`: None where the modes hold the joint's compliance
+    `axial`: what an axial tap showed
     """
 
     modes: TurningModes

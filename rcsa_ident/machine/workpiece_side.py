@@ -28,15 +28,9 @@ def gives_way(logs: FloatArray, omega: FloatArray) -> tuple[ComplexArray, Comple
 
     G_w = sum_n omega_n^2 / k_n / (omega_n^2 - omega^2 + 2 i zeta_n omega_n omega), which is passive whatever the logarithms are.
 
-    Parameters
-    ----------
-    logs : array, shape (3, m)
-        Of natural frequencies [rad/s], damping ratios and stiffnesses [N/m].
-    omega : array, shape (n,) [rad/s]
-
-    Returns
-    -------
-    complex arrays, shapes (n,) [m/N] and (3, m, n) [m/N]
+    `logs`, shape (3, m): of natural frequencies [rad/s], damping ratios and stiffnesses [N/m]
+    `omega` [rad/s], shape (n,)
+    Returns complex arrays, shapes (n,) [m/N] and (3, m, n) [m/N].
     """
     natural, zeta, stiffness = (each[:, None] for each in np.exp(logs))
     loss = 2j * zeta * natural * omega
@@ -50,23 +44,13 @@ def gives_way(logs: FloatArray, omega: FloatArray) -> tuple[ComplexArray, Comple
 class WorkpieceAxis(Shown):
     """What gives way on the workpiece's side along one machine axis, and what it was found from.
 
-    Parameters
-    ----------
-    sensor : str
-        The accelerometer that showed it.
-    role : Role
-        What that is fixed to.
-    omega_n : array, shape (m,) [rad/s]
-        Natural frequencies, rising; empty where nothing stands above the noise.
-    zeta : array, shape (m,) [-]
-    stiffness : array, shape (m,) [N/m]
-    covariance : array, shape (3 m, 3 m)
-        Of the logarithms of natural frequencies, then of damping ratios, then of stiffnesses.
-    lines : int
-    chi2_per_point : float [-]
-        Mean squared residual in standard deviations of noise and model error.
-    model_error : float [-]
-        Share of each line that neither the modes nor the records' noise explain.
+    `sensor`: the accelerometer that showed it
+    `role`: what that is fixed to
+    `omega_n` [rad/s], shape (m,): natural frequencies, rising; empty where nothing stands above the noise
+    `zeta` [-], shape (m,); `stiffness` [N/m], shape (m,)
+    `covariance`, shape (3 m, 3 m): of the logarithms of natural frequencies, then of damping ratios, then of stiffnesses
+    `chi2_per_point` [-]: mean squared residual in standard deviations of noise and model error
+    `model_error` [-]: share of each line that neither the modes nor the records' noise explain
     """
 
     sensor: str
@@ -127,10 +111,7 @@ class WorkpieceAxis(Shown):
 class WorkpieceSide(Shown):
     """What gives way on the workpiece's side of the cut, axis by axis; X and Y feel nothing of each other.
 
-    Parameters
-    ----------
-    axes : mapping of Dof to WorkpieceAxis
-        Those that an accelerometer showed.
+    `axes`: those that an accelerometer showed
     """
 
     axes: Mapping[Dof, WorkpieceAxis] = field(default_factory=dict)
@@ -141,13 +122,7 @@ class WorkpieceSide(Shown):
         return {axis: each for axis, each in self.axes.items() if each.omega_n.size}
 
     def beside(self, tip: UncertainReceptance) -> UncertainReceptance:
-        """Return the receptance between tool and workpiece, C11 + G_w, with the spread of both.
-
-        Parameters
-        ----------
-        tip : UncertainReceptance
-            C11 over the tip's translations.
-        """
+        """Return the receptance between tool and workpiece, C11 + G_w, with the spread of both. `tip`: C11 over the tip's translations."""
         own = {row: self.yielding[c.dof] for row, c in enumerate(tip.rows) if c.dof in self.yielding}
         if not own:
             return tip

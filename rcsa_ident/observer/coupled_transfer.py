@@ -28,15 +28,10 @@ _HIGHEST_ORDER = 60
 class CoupledTransfer:
     """C31 as a matrix: tip forces to the flange's displacements as the sensors show them, with poles that all entries share.
 
-    Parameters
-    ----------
-    fit : RationalFit
-        Rows are displacements, columns forces [m/N]; left and right shapes differ, as gyroscopic moments want.
-    step : float [s]
-    band : two floats [rad/s]
-        Frequencies between which the fit was asked to be good.
-    flatness : array, shape (c,) [dB]
-        Largest deviation of each direct entry's magnitude from the response that was given, in the band.
+    `fit`: rows are displacements, columns forces [m/N]; left and right shapes differ, as gyroscopic moments want
+    `step` [s]
+    `band`: two floats [rad/s], frequencies between which the fit was asked to be good
+    `flatness` [dB], shape (c,): largest deviation of each direct entry's magnitude from the response that was given, in the band
     """
 
     fit: RationalFit
@@ -57,10 +52,7 @@ class CoupledTransfer:
     def behind_high_pass(self, corner: float) -> PoleResidue:
         """Return the sampled filter from forces to high-passed displacements: poles in the z-plane, inputs of length 1.
 
-        Parameters
-        ----------
-        corner : float [rad/s]
-            Corner frequency of `high_pass`.
+        `corner` [rad/s]: corner frequency of `high_pass`
         """
         modes = self.fit.modes(RANK)
         passing, rho = high_pass_pole(corner, self.step)
@@ -85,25 +77,13 @@ def coupled_transfer(
 ) -> CoupledTransfer:
     """Return the transfer function of axes that feel each other.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-        Frequencies that reach beyond the band on both sides.
-    receptance : complex array, shape (n, c, c) [m/N]
-        C31: absolute motion of the flange (rows) per force at the tip (columns).
-    step : float [s]
-        Time between samples.
-    band : two floats [rad/s]
-        Frequencies between which the fit has to be good.
-    sensor : complex array, shape (n, c)
-        Frequency responses of the displacement sensors.
-    tolerance : float
-        Rms misfit over the direct entries; a cross entry's misfit, too, counts over the largest entry of its row.
-
-    Raises
-    ------
-    InputError
-        If the band lies outside the frequencies or above what the sampling rate can hold.
+    `omega` [rad/s], shape (n,): frequencies that reach beyond the band on both sides
+    `receptance` [m/N], shape (n, c, c): C31: absolute motion of the flange (rows) per force at the tip (columns)
+    `step` [s]: time between samples
+    `band`: two floats [rad/s], frequencies between which the fit has to be good
+    `sensor`, shape (n, c): frequency responses of the displacement sensors
+    `tolerance`: rms misfit over the direct entries; a cross entry's misfit, too, counts over the largest entry of its row
+    Raises `InputError` if the band lies outside the frequencies or above what the sampling rate can hold.
     """
     omega = np.asarray(omega, dtype=float)
     keep, inside = fitted_range(omega, step, band)

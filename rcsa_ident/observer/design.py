@@ -24,23 +24,14 @@ _ORDER_WANDER = 1e-7
 class AxisSettings:
     """What an observer has to know of one axis beside its transfer function.
 
-    Parameters
-    ----------
-    axis : Dof
-    force : ForceModel
-        `RandomWalk` or `TeethResonators`.
-    noise : float [m]
-        Standard deviation of a displacement sample.
-    acceleration_noise : float [m/s^2]
-        Standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise, as in [inprocess].
-    accelerometer : bool
-        Whether the fixture's acceleration is measured.
-    sensor_ratio : (omega, ratio), optional
-        Response of the displacement sensor over the accelerometer's.
-    run_out : RunOut, optional
-        Taken out of the signals.
-    spindle_speed : float [rad/s]
-        Orders of this speed below the band are taken for disturbance; with 0 there are none.
+    `force`: `RandomWalk` or `TeethResonators`
+    `noise` [m]: standard deviation of a displacement sample
+    `acceleration_noise` [m/s^2]: standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise, as
+        in [inprocess]
+    `accelerometer`: whether the fixture's acceleration is measured
+    `sensor_ratio`: (omega, ratio); response of the displacement sensor over the accelerometer's
+    `run_out`: taken out of the signals
+    `spindle_speed` [rad/s]: orders of this speed below the band are taken for disturbance; with 0 there are none
     """
 
     axis: Dof
@@ -75,11 +66,7 @@ def axis_observer(settings: AxisSettings, transfer: TransferFunction) -> ForceOb
 def coupled_observer(settings: Sequence[AxisSettings], transfer: CoupledTransfer) -> ForceObserver:
     """Return the observer of axes that feel each other: one filter, whose states they share.
 
-    Parameters
-    ----------
-    settings : sequence of AxisSettings
-        In the order of the transfer function's rows and columns.
-    transfer : CoupledTransfer
+    `settings`: in the order of the transfer function's rows and columns
     """
     direct = [transfer.direct(i) for i in range(len(settings))]
     return _observer(settings, direct, transfer.behind_high_pass(CORNER * transfer.band[0]))

@@ -24,13 +24,10 @@ LEFT = 0.02
 class RunOut:
     """What a turning spindle shows without cutting: lines of the air cut, turned to lie under the record.
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-    order : array, shape (o,)
-        Multiples of the spindle's frequency: whole numbers from 1, rising.
-    gap, acceleration : complex arrays, shape (o,) [m], [m/s^2]
-        Signal = Re sum line e^{i order Omega t}, t from the record's first sample.
+    `spindle_speed` [rad/s]
+    `order`, shape (o,): multiples of the spindle's frequency: whole numbers from 1, rising
+    `gap`, `acceleration`: complex arrays, shape (o,) [m], [m/s^2]; signal = Re sum line e^{i order Omega t}, t from the record's first
+        sample
     """
 
     spindle_speed: float
@@ -67,17 +64,10 @@ class RunOut:
 class AxisSensors:
     """What one axis' sensors show of the flange's displacement, and how it follows the force.
 
-    Parameters
-    ----------
-    axis : Dof
-    transfer : TransferFunction
-        Tip force to the flange's displacement as the sensor shows it.
-    corner : float [rad/s]
-        Corner frequency of the high-pass that gap and fixture's motion share.
-    gap_filter, acceleration_filter : SampledModes
-        The latter None without an accelerometer: the gap is then taken for the flange's motion.
-    run_out : RunOut or None
-        Taken out of the signals where it is known.
+    `transfer`: tip force to the flange's displacement as the sensor shows it
+    `corner` [rad/s]: corner frequency of the high-pass that gap and fixture's motion share
+    `gap_filter`, `acceleration_filter`: the latter None without an accelerometer: the gap is then taken for the flange's motion
+    `run_out`: taken out of the signals where it is known
     """
 
     axis: Dof
@@ -105,15 +95,7 @@ class AxisState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObserverState:
-    """Where a stream stands.
-
-    Parameters
-    ----------
-    count : int
-        Samples seen.
-    axes : tuple of AxisState
-    filters : tuple of FilterState
-    """
+    """Where a stream stands. `count`: samples seen."""
 
     count: int
     axes: tuple[AxisState, ...]
@@ -129,14 +111,9 @@ class ObserverState:
 class ForceBlock:
     """Estimates at some samples.
 
-    Parameters
-    ----------
-    force : array, shape (n, a) [N]
-        The force without its mean: below the band the displacement says nothing of it.
-    walking : array, shape (n, a) [N]
-        The part that no oscillator holds; all of it with a random walk alone.
-    innovation : array, shape (n, a) [m]
-        Measured less predicted displacement.
+    `force` [N], shape (n, a): the force without its mean: below the band the displacement says nothing of it
+    `walking` [N], shape (n, a): the part that no oscillator holds; all of it with a random walk alone
+    `innovation` [m], shape (n, a): measured less predicted displacement
     """
 
     force: FloatArray
@@ -148,18 +125,12 @@ class ForceBlock:
 class ForceEstimate(Saved):
     """Forces of a record.
 
-    Parameters
-    ----------
-    axes : tuple of Dof
-    step : float [s]
-    force : array, shape (n, a) [N]
-    standard_deviation : array, shape (n, a) [N]
-        What follows from sensor noise and the force model, raised where the innovations scatter more than they should.
-    consistency : array, shape (a,) [-], or None
-        Scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more where they are too
-        sure of themselves. None of forces from a file.
-    start : float [s]
-        Time of the first force from the record's first sample: 0 where the observer's start is among them.
+    `step` [s]; `force` [N], shape (n, a)
+    `standard_deviation` [N], shape (n, a): what follows from sensor noise and the force model, raised where the innovations scatter more
+        than they should
+    `consistency` [-], shape (a,): scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more
+        where they are too sure of themselves. None of forces from a file.
+    `start` [s]: time of the first force from the record's first sample: 0 where the observer's start is among them
     """
 
     axes: tuple[Dof, ...]
@@ -189,11 +160,7 @@ class ForceEstimate(Saved):
 class ForceObserver:
     """Tip forces from the flange's vibration; `run` is a scan of `step`, in blocks of any size with the same result.
 
-    Parameters
-    ----------
-    axes : tuple of AxisSensors
-    filters : tuple of KalmanFilter
-        In the order of the axes, each for as many of them as feel each other.
+    `filters`: in the order of the axes, each for as many of them as feel each other
     """
 
     axes: tuple[AxisSensors, ...]
@@ -253,26 +220,14 @@ class ForceObserver:
         return control.ss(control.append(*parts)[[*force, *innovation], :], inputs=inputs, outputs=outputs)
 
     def step(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
-        """Return the state and the estimates after one sample of each axis.
-
-        Parameters
-        ----------
-        state : ObserverState
-        gap : array, shape (a,) [m]
-        acceleration : array, shape (a,) [m/s^2], optional
-        """
+        """Return the state and the estimates after one sample of each axis. `gap` [m], shape (a,). `acceleration` [m/s^2], shape (a,)."""
         return self.run(state, np.asarray(gap)[None], None if acceleration is None else np.asarray(acceleration)[None])
 
     def run(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
         """Return the state after a block of samples and the estimates at them.
 
-        Parameters
-        ----------
-        state : ObserverState
-        gap : array, shape (n, a) [m]
-            The gap as the displacement sensors show it, in the order of `axes`.
-        acceleration : array, shape (n, a) [m/s^2], optional
-            Acceleration of the sensors' fixture.
+        `gap` [m], shape (n, a): the gap as the displacement sensors show it, in the order of `axes`
+        `acceleration` [m/s^2], shape (n, a): acceleration of the sensors' fixture
         """
         return self._scan(state, gap, acceleration, lost=False)
 
@@ -303,29 +258,17 @@ class ForceObserver:
         The Kalman filter predicts and corrects nothing: oscillators go on as they were. The filters before it need an input and
         get the substitutes; what is wrong with those they forget within a few periods of the high-pass.
 
-        Parameters
-        ----------
-        state : ObserverState
-        gap, acceleration : arrays, shape (n, a) [m], [m/s^2]
-            Substitutes for the lost samples.
+        `gap`, `acceleration`: arrays, shape (n, a) [m], [m/s^2]; substitutes for the lost samples
         """
         return self._scan(state, gap, acceleration, lost=True)
 
     def observe(self, gap: FloatArray, acceleration: FloatArray | None = None, smooth: bool = False) -> ForceEstimate:
         """Return the forces of a whole record.
 
-        Parameters
-        ----------
-        gap : array, shape (n, a) [m]
-        acceleration : array, shape (n, a) [m/s^2], optional
-            Acceleration of the sensors' fixture.
-        smooth : bool
-            Each sample given all others; else given those before it, as live.
-
-        Returns
-        -------
-        ForceEstimate
-            From the first sample on: until `settling` it is the observer's start.
+        `gap` [m], shape (n, a)
+        `acceleration` [m/s^2], shape (n, a): acceleration of the sensors' fixture
+        `smooth`: each sample given all others; else given those before it, as live
+        Returns ForceEstimate: from the first sample on: until `settling` it is the observer's start.
         """
         block = self.run(self.init(), gap, acceleration)[1]
         n = block.force.shape[0]
@@ -350,17 +293,9 @@ class ForceObserver:
 def restore_mean_force(estimate: ForceEstimate, idle: float) -> tuple[ForceEstimate, FloatArray]:
     """Return the estimate with the mean that an interrupted cut gives away: between its teeth the force is zero.
 
-    Parameters
-    ----------
-    estimate : ForceEstimate
-    idle : float
-        Share of the time in which no tooth cuts, at least.
-
-    Returns
-    -------
-    ForceEstimate and array, shape (a,) [N]
-        The forces, and what was added to each axis: the middle of the narrowest range that holds half of the idle share,
-        with its sign turned.
+    `idle`: share of the time in which no tooth cuts, at least
+    Returns ForceEstimate and array, shape (a,) [N]: the forces, and what was added to each axis: the middle of the narrowest range that
+        holds half of the idle share, with its sign turned.
     """
     if not 0.0 < idle < 1.0:
         raise InputError("idle share", f"{100.0 * idle:g} %", "more than 0 % and less than 100 %: the time in which no tooth cuts")

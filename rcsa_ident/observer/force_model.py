@@ -29,12 +29,8 @@ class ForceModel(Protocol):
 class RandomWalk:
     """f[k+1] = f[k] + eta ([inprocess], eq. 17), which may slowly forget: behind a high-pass the mean cannot be seen.
 
-    Parameters
-    ----------
-    intensity : float [N/sqrt(s)]
-        Standard deviation of the walk after a second.
-    leak : float [rad/s]
-        Rate at which it forgets; 0 is the walk of [inprocess].
+    `intensity` [N/sqrt(s)]: standard deviation of the walk after a second
+    `leak` [rad/s]: rate at which it forgets; 0 is the walk of [inprocess]
     """
 
     intensity: float
@@ -53,14 +49,9 @@ class RandomWalk:
 class TeethResonators:
     """A random walk and an undamped oscillator at each harmonic, whose amplitude and phase walk at random.
 
-    Parameters
-    ----------
-    walk : RandomWalk
-        What is not periodic.
-    omega : array, shape (j,) [rad/s]
-        Multiples of the tooth-passing frequency; with cutter run-out, of the spindle's.
-    intensity : array, shape (j,) [N/sqrt(s)]
-        How fast each amplitude walks.
+    `walk`: what is not periodic
+    `omega` [rad/s], shape (j,): multiples of the tooth-passing frequency; with cutter run-out, of the spindle's
+    `intensity` [N/sqrt(s)], shape (j,): how fast each amplitude walks
     """
 
     walk: RandomWalk
@@ -85,18 +76,11 @@ class TeethResonators:
 class AxisNoise:
     """What one axis' force and sensors add to the augmented model.
 
-    Parameters
-    ----------
-    force : ForceModel
-    noise : float [m]
-        Standard deviation of a displacement sample: the measurement noise of [inprocess], eq. 17.
-    acceleration : SampledModes or None
-        Filter from the fixture's acceleration to displacement: it colours the accelerometer's noise.
-    acceleration_noise : float [m/s^2]
-        Standard deviation of a sample.
-    disturbance : array, shape (d,) [rad/s]
-        Frequencies at which the measurement is not believed: orders of the spindle below the identified band.
-    disturbance_intensity : float [m/sqrt(s)]
+    `noise` [m]: standard deviation of a displacement sample: the measurement noise of [inprocess], eq. 17.
+    `acceleration`: filter from the fixture's acceleration to displacement: it colours the accelerometer's noise
+    `acceleration_noise` [m/s^2]: standard deviation of a sample
+    `disturbance` [rad/s], shape (d,): frequencies at which the measurement is not believed: orders of the spindle below the identified band
+    `disturbance_intensity` [m/sqrt(s)]
     """
 
     force: ForceModel
@@ -111,24 +95,15 @@ class AxisNoise:
 class AugmentedModel:
     """A plant that all forces enter, the modes of each force, then those of each sensor's noise (see `_kernels`).
 
-    Parameters
-    ----------
-    decay : complex array, shape (m,) [-]
-        Factor of each mode from one sample to the next.
-    inputs : complex array, shape (plants, c)
-        What a force adds to the plant's modes.
-    observed : complex array, shape (c, m)
-        Measurement j is sum Re(observed[j] x) + through[j] @ force + noise.
-    ends : tuple of c + 1 ints
-        Where the plant's modes end, and then those of each force.
-    through : array, shape (c, c) [m/N]
-    drive : array, shape (m,)
-        Standard deviation of what is added, per step, to the real and to the imaginary part of a force or noise mode.
-    common : array, shape (c, m)
-        Standard deviation of what each axis' accelerometer noise adds to the modes' real parts.
-    noise : array, shape (c,) [m]
-        Standard deviation of a measured sample.
-    step : float [s]
+    `decay` [-], shape (m,): factor of each mode from one sample to the next
+    `inputs`, shape (plants, c): what a force adds to the plant's modes
+    `observed`, shape (c, m): measurement j is sum Re(observed[j] x) + through[j] @ force + noise
+    `ends`: tuple of c + 1 ints, where the plant's modes end, and then those of each force
+    `through` [m/N], shape (c, c)
+    `drive`, shape (m,): standard deviation of what is added, per step, to the real and to the imaginary part of a force or noise mode
+    `common`, shape (c, m): standard deviation of what each axis' accelerometer noise adds to the modes' real parts
+    `noise` [m], shape (c,): standard deviation of a measured sample
+    `step` [s]
     """
 
     decay: ComplexArray
@@ -194,12 +169,9 @@ class AugmentedModel:
 def augmented(plant: PoleResidue, axes: Sequence[AxisNoise], step: float) -> AugmentedModel:
     """Return the augmented model of one axis, or of several that feel each other.
 
-    Parameters
-    ----------
-    plant : PoleResidue
-        Tip forces to measured displacements, sampled [m/N].
-    axes : sequence of AxisNoise, one for each force and measurement
-    step : float [s]
+    `plant`: tip forces to measured displacements, sampled [m/N]
+    `axes`: sequence of AxisNoise, one for each force and measurement
+    `step` [s]
     """
     count, plants = len(axes), plant.pole.size
     outputs, inputs = plant.outputs, plant.inputs

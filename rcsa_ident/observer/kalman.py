@@ -22,14 +22,7 @@ SETTLED, LONGEST_SETTLING = 1e-6, 1000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilterState:
-    """Where a stream stands.
-
-    Parameters
-    ----------
-    count : int
-        Samples seen.
-    modes : array, shape (2, m)
-    """
+    """Where a stream stands. `count`: samples seen. `modes`, shape (2, m)."""
 
     count: int
     modes: FloatArray
@@ -39,17 +32,10 @@ class FilterState:
 class KalmanFilter:
     """Gains for c forces and as many measurements: a settling phase of full covariance, then the steady state.
 
-    Parameters
-    ----------
-    model : AugmentedModel
-    gain : array, shape (s, c, 2, m)
-        Of each measurement; the last is the steady one.
-    variance : array, shape (s, c, c) [m^2]
-        Covariance of the innovations.
-    row : array, shape (s, c, 2, m)
-        Covariance of each force with the state after the correction.
-    force_variance : array, shape (s, c) [N^2]
-        Variance of each force after the correction.
+    `gain`, shape (s, c, 2, m): of each measurement; the last is the steady one
+    `variance` [m^2], shape (s, c, c): covariance of the innovations
+    `row`, shape (s, c, 2, m): covariance of each force with the state after the correction
+    `force_variance` [N^2], shape (s, c): variance of each force after the correction
     """
 
     model: AugmentedModel
@@ -70,10 +56,7 @@ class KalmanFilter:
     def run(self, state: FilterState, measured: FloatArray) -> tuple[FilterState, FloatArray]:
         """Return the state after a block, and forces [N], their walking parts [N] and innovations [m] at its samples, shape (n, 3, c).
 
-        Parameters
-        ----------
-        state : FilterState
-        measured : array, shape (n, c) [m]
+        `measured` [m], shape (n, c)
         """
         return self._scan(state, self.gain, state.count, np.ascontiguousarray(measured, dtype=float))
 
@@ -102,12 +85,8 @@ class KalmanFilter:
     def lag_weights(self, lag: int, at: int | None = None) -> FloatArray:
         """Return what each later innovation adds to the forces of a sample, shape (lag, c, c) [N/m]: later sample, force, innovation.
 
-        Parameters
-        ----------
-        lag : int
-            Number of later innovations.
-        at : int, optional
-            Number of the sample in the settling phase; by default one of the steady state.
+        `lag`: number of later innovations
+        `at`: number of the sample in the settling phase; by default one of the steady state
         """
         shown, inverse = self._ahead(lag, at)
         return shown @ inverse
@@ -115,13 +94,8 @@ class KalmanFilter:
     def standard_deviation(self, count: int, smoothed: bool = False, longest: int = 4096) -> FloatArray:
         """Return the forces' standard deviations at `count` samples from the first, given those before or all, shape (count, c) [N].
 
-        Parameters
-        ----------
-        count : int
-        smoothed : bool
-            Given all samples; else given those before.
-        longest : int
-            How far a sample looks ahead.
+        `smoothed`: given all samples; else given those before
+        `longest`: how far a sample looks ahead
         """
         last = self.gain.shape[0] - 1
         variance = self.force_variance[np.minimum(np.arange(count), last)]
@@ -136,16 +110,9 @@ class KalmanFilter:
     def response(self, omega: FloatArray, lag: int = 0) -> tuple[ComplexArray, ComplexArray]:
         """Return the observer's frequency response in the steady state, measured displacements to forces, shape (n, c, c) [N/m].
 
-        Parameters
-        ----------
-        omega : array, shape (n,) [rad/s]
-        lag : int
-            With a fixed lag, the delay by it taken out; a long one stands for the smoother.
-
-        Returns
-        -------
-        complex arrays, shape (n, c, c)
-            Displacements to forces [N/m], displacements to innovations [-].
+        `omega` [rad/s], shape (n,)
+        `lag`: with a fixed lag, the delay by it taken out; a long one stands for the smoother
+        Returns complex arrays, shape (n, c, c): displacements to forces [N/m], displacements to innovations [-].
         """
         a, seen, rows, gain = self._steady()
         # triangular, so that each frequency costs a substitution: a solution each takes seconds and hundreds of megabytes
@@ -227,16 +194,8 @@ class KalmanFilter:
 def kalman_filter(model: AugmentedModel, longest_settling: int = LONGEST_SETTLING) -> KalmanFilter:
     """Return the filter's gains: steady ones from the Riccati equation, before them those of the full covariance.
 
-    Parameters
-    ----------
-    model : AugmentedModel
-    longest_settling : int
-        Steps of full covariance at most; they end where the gain is steady. 0 starts with the steady gain.
-
-    Raises
-    ------
-    InputError
-        If the Riccati equation has no stabilising solution: a force mode that no measurement shows.
+    `longest_settling`: steps of full covariance at most; they end where the gain is steady. 0 starts with the steady gain.
+    Raises `InputError` if the Riccati equation has no stabilising solution: a force mode that no measurement shows.
     """
     a, seen, rows, q = model.matrices()
     steady = riccati(a, seen, q)
@@ -265,10 +224,7 @@ def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
     Each step covers twice the samples of the last [chu2004]. Oscillators without damping have poles on the unit
     circle, where the ordered Schur form of the usual solution loses its order.
 
-    Parameters
-    ----------
-    a, q : arrays, shape (n, n)
-    seen : array, shape (p, n)
+    `a`, `q`, shape (n, n); `seen`, shape (p, n)
     """
     size = 1.0 / np.maximum(np.sqrt(np.diag(q)), 1e-3 * np.sqrt(np.max(np.diag(q))))
     # in units of what each state gains in a step, so that none is lost beside another

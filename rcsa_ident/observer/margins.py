@@ -20,22 +20,15 @@ _EVEN, _DECADES, _BESIDE = 300, 300, 12
 class ObserverMargins:
     """Margins of a loop L whose sensitivity is S = 1 / (1 + L).
 
-    Parameters
-    ----------
-    gain_decrease, gain_increase : float [-]
-        Factors on the gain, below and above 1, at which the error no longer dies out: 0 and infinite where there is none.
-    phase : float [rad]
-        Further lag (or lead) round the loop that it stands; infinite where |L| never is 1.
-    delay : float [s]
-        By which the corrections may come late.
-    sensitivity_peak : float [-]
-        M_s = max |S|: the most by which an innovation exceeds the displacement that the model did not foresee. 1 / M_s is the least
-        distance of L from -1.
-    peak_frequency : float [rad/s]
-        Where it is.
-    disk : float [-]
-        Disk margin, 1 / max |S - 1/2|, up to 2: gain and phase may change at once, by any factor in the disk that has
-        (2 - disk) / (2 + disk) and its inverse as ends of a diameter.
+    `gain_decrease`, `gain_increase` [-]: factors on the gain, below and above 1, at which the error no longer dies out: 0 and infinite
+        where there is none
+    `phase` [rad]: further lag (or lead) round the loop that it stands; infinite where |L| never is 1
+    `delay` [s]: by which the corrections may come late
+    `sensitivity_peak` [-]: M_s = max |S|: the most by which an innovation exceeds the displacement that the model did not foresee. 1 / M_s
+        is the least distance of L from -1.
+    `peak_frequency` [rad/s]: where it is
+    `disk` [-]: disk margin, 1 / max |S - 1/2|, up to 2: gain and phase may change at once, by any factor in the disk that has (2 - disk) /
+        (2 + disk) and its inverse as ends of a diameter
     """
 
     gain_decrease: float
@@ -54,10 +47,6 @@ def observer_margins(kalman: KalmanFilter) -> ObserverMargins:
     L(z) = H (z I - A)^-1 A K. The machine does not stand in it: margins tell how the model and the force model together answer to
     what they do not foresee, and what a gain that was changed by hand, or a computer that answers late, may do. The steady Riccati
     equation promises M_s <= sqrt(variance of the innovation) / noise.
-
-    Parameters
-    ----------
-    kalman : KalmanFilter
     """
     return loop_margins(kalman.loop())
 
@@ -65,10 +54,7 @@ def observer_margins(kalman: KalmanFilter) -> ObserverMargins:
 def loop_margins(loop: StateSpace) -> ObserverMargins:
     """Return the margins of a sampled loop of one input and one output, closed with a minus sign.
 
-    Raises
-    ------
-    InputError
-        If there are more of them, or the closed loop is not stable.
+    Raises `InputError` if there are more of them, or the closed loop is not stable.
     """
     import control
 

@@ -19,17 +19,11 @@ _FAR = 2048
 class ObserverFRF:
     """Frequency response of one axis' observer in the steady state.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-    observer : complex array, shape (n,) [N/m]
-        Measured displacement to force.
-    compensated : complex array, shape (n,) [-]
-        The observer's response times the machine's from tip force to displacement: 1 where the observer is right.
-    line : array, shape (j,) [rad/s]
-        Frequencies at which the force of a steady cut has its lines.
-    at_line : complex array, shape (j,) [-]
-        The compensated response there.
+    `omega` [rad/s], shape (n,)
+    `observer` [N/m], shape (n,): measured displacement to force
+    `compensated` [-], shape (n,): the observer's response times the machine's from tip force to displacement: 1 where the observer is right
+    `line` [rad/s], shape (j,): frequencies at which the force of a steady cut has its lines
+    `at_line` [-], shape (j,): the compensated response there
     """
 
     omega: FloatArray
@@ -51,13 +45,9 @@ class ObserverFRF:
     def usable(self, start: float, at_lines: bool = False, within: float = FLAT) -> tuple[float, float]:
         """Return the band around or above `start` in which the compensated magnitude stays flat [rad/s]; NaN where there is none.
 
-        Parameters
-        ----------
-        start : float [rad/s]
-        at_lines : bool
-            Look only where a steady cut has force: an oscillator is right at its own frequency.
-        within : float [dB]
-            Deviation that is allowed.
+        `start` [rad/s]
+        `at_lines`: look only where a steady cut has force: an oscillator is right at its own frequency
+        `within` [dB]: deviation that is allowed
         """
         omega, level = (self.line, decibel(self.at_line)) if at_lines else (self.omega, self.level)
         good, above = np.abs(level) <= within, np.flatnonzero(omega >= start * (1.0 - 1e-9))
@@ -99,17 +89,12 @@ def observer_response(
 
     Each is the estimate of a force over that force, the others being none: what the observer takes of one for another is not in it.
 
-    Parameters
-    ----------
-    observer : ForceObserver
-    omega : array, shape (n,) [rad/s]
-    machine : complex array, shape (n, a, a) [m/N]
-        Response from tip forces (columns) to the flange's displacements as the sensors show them: the true one where it is known,
-        else the identified.
-    line, machine_at_line : arrays, shape (j,) [rad/s], (j, a, a) [m/N]
-        Frequencies of the force's lines, and the machine's response there.
-    smoothed : bool
-        The estimate given all samples, instead of those before.
+    `omega` [rad/s], shape (n,)
+    `machine` [m/N], shape (n, a, a): response from tip forces (columns) to the flange's displacements as the sensors show them: the true
+        one where it is known, else the identified
+    `line`, `machine_at_line`: arrays, shape (j,) [rad/s], (j, a, a) [m/N]; frequencies of the force's lines, and the machine's response
+        there
+    `smoothed`: the estimate given all samples, instead of those before
     """
     omega, line = np.asarray(omega, dtype=float), np.asarray(line, dtype=float)
     passed = [np.stack([each.gap_filter.response(w) for each in observer.axes], axis=1) for w in (omega, line)]

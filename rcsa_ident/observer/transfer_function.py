@@ -28,16 +28,10 @@ HIGHEST = 0.45
 class SampledModes:
     """A stable filter y[k] = through u[k] + sum 2 Re(gain x[k]), x[k+1] = decay x[k] + u[k].
 
-    Parameters
-    ----------
-    decay : complex array, shape (m,) [-]
-        Poles in the z-plane, one of each conjugate pair.
-    gain : complex array, shape (m,)
-        Output per state.
-    through : float
-        Output per input at the same sample.
-    step : float [s]
-        Time between samples.
+    `decay` [-], shape (m,): poles in the z-plane, one of each conjugate pair
+    `gain`, shape (m,): output per state
+    `through`: output per input at the same sample
+    `step` [s]: time between samples
     """
 
     decay: ComplexArray
@@ -109,13 +103,7 @@ class TransferFunction:
         return self.fit.response(warped(omega, self.step))[:, 0, 0]
 
     def behind_high_pass(self, corner: float) -> SampledModes:
-        """Return the sampled filter from force to high-passed displacement.
-
-        Parameters
-        ----------
-        corner : float [rad/s]
-            Corner frequency of `high_pass`.
-        """
+        """Return the sampled filter from force to high-passed displacement. `corner` [rad/s]: corner frequency of `high_pass`."""
         poles, rho = high_pass_pole(corner, self.step)
         pole, residue = self.fit.pole, self.fit.residue[:, 0, 0]
         passed = residue * pole**2 / ((pole - poles) * (pole - poles.conjugate()))
@@ -139,27 +127,14 @@ def transfer_function(
 ) -> TransferFunction:
     """Return the transfer function of one axis.
 
-    Parameters
-    ----------
-    omega : array, shape (n,) [rad/s]
-        Frequencies that reach beyond the band on both sides, so that nothing odd happens there.
-    receptance : complex array, shape (n,) [m/N]
-        C31: absolute motion of the flange per force at the tip.
-    step : float [s]
-        Time between samples.
-    band : two floats [rad/s]
-        Frequencies between which the fit has to be good.
-    sensor : complex array, shape (n,), optional
-        Frequency response of the displacement sensor: bandwidth and delay.
-    order : int, optional
-        Number of poles; by default the smallest that is good to the tolerance.
-    tolerance : float
-        Relative rms misfit; outside the band it counts a twentieth.
-
-    Raises
-    ------
-    InputError
-        If the band lies outside the frequencies or above what the sampling rate can hold.
+    `omega` [rad/s], shape (n,): frequencies that reach beyond the band on both sides, so that nothing odd happens there
+    `receptance` [m/N], shape (n,): C31: absolute motion of the flange per force at the tip
+    `step` [s]: time between samples
+    `band`: two floats [rad/s], frequencies between which the fit has to be good
+    `sensor`, shape (n,): frequency response of the displacement sensor: bandwidth and delay
+    `order`: number of poles; by default the smallest that is good to the tolerance
+    `tolerance`: relative rms misfit; outside the band it counts a twentieth
+    Raises `InputError` if the band lies outside the frequencies or above what the sampling rate can hold.
     """
     omega, low, high = np.asarray(omega, dtype=float), *band
     keep, inside = fitted_range(omega, step, band)
@@ -175,10 +150,7 @@ def transfer_function(
 def fitted_range(omega: FloatArray, step: float, band: tuple[float, float]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which frequencies [rad/s] a fit looks at, and which of them have to be good, shape (n,) each.
 
-    Raises
-    ------
-    InputError
-        If the band lies outside the frequencies or above what the sampling rate can hold.
+    Raises `InputError` if the band lies outside the frequencies or above what the sampling rate can hold.
     """
     low, high = band
     keep = omega <= HIGHEST * 2.0 * np.pi / step
@@ -203,18 +175,11 @@ def acceleration_filter(
 ) -> SampledModes:
     """Return the filter from the fixture's acceleration to its high-passed displacement: `high_pass` over -omega^2.
 
-    Parameters
-    ----------
-    corner : float [rad/s]
-        Corner frequency of the high-pass.
-    step : float [s]
-        Time between samples.
-    band : two floats [rad/s]
-        Frequencies between which the filter has to be good.
-    ratio : complex array, shape (n,), optional
-        Response of the displacement sensor over that of the accelerometer at `omega`, so that both arrive alike.
-    omega : array, shape (n,), optional [rad/s]
-        Frequencies of the fit; by default 400 from half the corner to a fifth above the band.
+    `corner` [rad/s]: corner frequency of the high-pass
+    `step` [s]: time between samples
+    `band`: two floats [rad/s], frequencies between which the filter has to be good
+    `ratio`, shape (n,): response of the displacement sensor over that of the accelerometer at `omega`, so that both arrive alike
+    `omega` [rad/s], shape (n,): frequencies of the fit; by default 400 from half the corner to a fifth above the band
     """
     positive("corner", corner, "rad/s")
     if omega is None:

@@ -27,14 +27,9 @@ BESIDE = 0.1
 class Tuning:
     """What the covariances are chosen from.
 
-    Parameters
-    ----------
-    noise_floor : float [m]
-        Standard deviation of a displacement sample without any motion.
-    bandwidth : float [rad/s]
-        Frequency up to which the estimate shall follow the force.
-    response_time : float [s]
-        Time in which an oscillator's amplitude follows a change of the cut.
+    `noise_floor` [m]: standard deviation of a displacement sample without any motion
+    `bandwidth` [rad/s]: frequency up to which the estimate shall follow the force
+    `response_time` [s]: time in which an oscillator's amplitude follows a change of the cut
     """
 
     noise_floor: float
@@ -101,13 +96,9 @@ class Tuning:
 def harmonics(spindle_speed: float, teeth: int, band: tuple[float, float], run_out: bool = True) -> FloatArray:
     """Return the frequencies of a steady cut's force in a band, shape (j,) [rad/s].
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-    teeth : int
-    band : two floats [rad/s]
-    run_out : bool
-        True where teeth are not alike: all multiples of the spindle's frequency, else those of the tooth-passing frequency.
+    `spindle_speed` [rad/s]
+    `band`: two floats [rad/s]
+    `run_out`: True where teeth are not alike: all multiples of the spindle's frequency, else those of the tooth-passing frequency
     """
     step = positive("spindle speed", spindle_speed, "rad/s") * (1 if run_out else teeth)
     return step * np.arange(np.ceil(band[0] / step - 1e-9), np.floor(band[1] / step + 1e-9) + 1.0)
@@ -143,12 +134,8 @@ class ObserverMethod(Protocol):
 class Resonators:
     """Oscillators at the harmonics of the teeth beside a random walk: no lag in a steady cut.
 
-    Parameters
-    ----------
-    run_out : bool
-        Also at the spindle's other orders, on which an eccentric cutter cuts.
-    response_turns : float
-        Revolutions in which an oscillator follows a change of the cut.
+    `run_out`: also at the spindle's other orders, on which an eccentric cutter cuts
+    `response_turns`: revolutions in which an oscillator follows a change of the cut
     """
 
     run_out: bool = True

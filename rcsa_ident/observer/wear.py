@@ -24,26 +24,15 @@ _TRIALS = 96
 class WearIndicators:
     """Coefficients of each revolution.
 
-    Parameters
-    ----------
-    time : array, shape (n,) [s]
-        Middle of each revolution.
-    coefficient : array, shape (n, c) [N/m^2 of K_tc and K_rc, N/m of K_te and K_re]
-        Least squares of each revolution by itself.
-    standard_deviation : array, shape (n, c)
-        As what the model leaves of that revolution's lines suggests.
-    tracked, tracked_deviation : arrays, shape (n, c)
-        Coefficients and standard deviations of a slow random walk, each given all revolutions.
-    names : tuple of str
-        Of the c coefficients.
-    separable : bool
-        False where the lines in the band do not tell the coefficients from each other: then only sums of them mean something.
-    condition : float
-        Condition number of the scaled normal equations.
-    angle : float [rad]
-        Immersion of tooth 1 at the first sample, up to a pitch.
-    misfit : float [-]
-        Norm of what is left of all lines over their own.
+    `time` [s], shape (n,): middle of each revolution
+    `coefficient` [N/m^2 of K_tc and K_rc, N/m of K_te and K_re], shape (n, c): least squares of each revolution by itself
+    `standard_deviation`, shape (n, c): as what the model leaves of that revolution's lines suggests
+    `tracked`, `tracked_deviation`, shape (n, c): coefficients and standard deviations of a slow random walk, each given all revolutions
+    `names`: of the c coefficients
+    `separable`: False where the lines in the band do not tell the coefficients from each other: then only sums of them mean something
+    `condition`: condition number of the scaled normal equations
+    `angle` [rad]: immersion of tooth 1 at the first sample, up to a pitch
+    `misfit` [-]: norm of what is left of all lines over their own
     """
 
     time: FloatArray

@@ -32,15 +32,9 @@ def usable_figure(
 ) -> Figure:
     """How deep one may cut and what stands against more, the removal rate below.
 
-    Parameters
-    ----------
-    depths : UsableDepths
-    marks : sequence of Mark
-        Recommended cuts.
-    planned : sequence of Mark
-        Cuts that somebody wants to make.
-    common : array, shape (n,) [m], optional
-        What is stable on all machines that are consistent with the recordings.
+    `marks`: recommended cuts
+    `planned`: cuts that somebody wants to make
+    `common` [m], shape (n,): what is stable on all machines that are consistent with the recordings
     """
     figure, grid = figure_grid(2, 1, 5.2, (2.0, 1.0), sharey="none")
     top, bottom = grid[:, 0]
@@ -120,11 +114,8 @@ def _beside(ax: Axes, x: float, y: float, text: str, colour: str, speed: FloatAr
 def comparison_figure(curves: Mapping[str, UsableDepths], marks: Mapping[str, Mark]) -> Figure:
     """Usable depth and removal rate of several toolings or stickouts over speed.
 
-    Parameters
-    ----------
-    curves : mapping of name to UsableDepths
-    marks : mapping of name to Mark
-        The best cut of each.
+    `curves`: mapping of name to UsableDepths
+    `marks`: mapping of name to Mark, the best cut of each
     """
     figure, grid = figure_grid(2, 1, 5.6, (1.4, 1.0), sharey="none")
     top, bottom = grid[:, 0]

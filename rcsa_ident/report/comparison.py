@@ -31,15 +31,10 @@ def save(figure: Figure, path: str | Path) -> None:
 class MeanForces:
     """Mean forces of cuts that differ in their feed only.
 
-    Parameters
-    ----------
-    title : str
-    feed : array, shape (n,) [m]
-    force : array, shape (n, c) [N]
-        X, Y and perhaps axial.
-    line_feed : array, shape (2,) [m]
-    line : array, shape (2, c) [N]
-        What the fitted coefficients say.
+    `feed` [m], shape (n,)
+    `force` [N], shape (n, c): X, Y and perhaps axial
+    `line_feed` [m], shape (2,)
+    `line` [N], shape (2, c): what the fitted coefficients say
     """
 
     title: str
@@ -72,22 +67,12 @@ def mean_forces(groups: Sequence[MeanForces]) -> Figure:
 class FrfPair:
     """One response, measured by hammer and identified.
 
-    Parameters
-    ----------
-    title : str
-        What it is a response of, as in ``C11, tool tip, X``.
-    colour : str
-        X or Y.
-    frequency : array, shape (n,) [Hz]
-    identified : complex array, shape (n,) [m/N]
-    hammer_frequency : array, shape (h,) [Hz]
-    hammer : complex array, shape (h,) [m/N]
-    deviation : (array, array) or None, shape (n,) each [m/N]
-        Standard deviations of the identified real and imaginary part.
-    peaks : sequence of (hammer Hz, identified Hz or None)
-        Modes that both show, and such as only the hammer test does.
-    correlation : (array, array) or None
-        Middles of frequency bands [Hz] and the FRAC in each [-].
+    `title`: what it is a response of, as in ``C11, tool tip, X``
+    `colour`: X or Y
+    `frequency` [Hz], shape (n,); `identified` [m/N], shape (n,); `hammer_frequency` [Hz], shape (h,); `hammer` [m/N], shape (h,)
+    `deviation`: (array, array) or None, shape (n,) each [m/N]; standard deviations of the identified real and imaginary part
+    `peaks`: sequence of (hammer Hz, identified Hz or None); modes that both show, and such as only the hammer test does
+    `correlation`: (array, array) or None; middles of frequency bands [Hz] and the FRAC in each [-]
     """
 
     title: str
@@ -109,15 +94,9 @@ def frf_comparison(
 ) -> Figure:
     """Hammer and identified responses on top of each other, a column for each; below them their FRAC over frequency.
 
-    Parameters
-    ----------
-    pairs : sequence of FrfPair
-    names : (str, str)
-        Names of the hammer's and of the other curve.
-    band_hz : (float, float), optional
-        Frequencies between which the machine was identified; outside is shaded.
-    real_and_imaginary : bool
-        Draw these in place of magnitude and phase.
+    `names`: (str, str); names of the hammer's and of the other curve
+    `band_hz`: (float, float); frequencies between which the machine was identified; outside is shaded
+    `real_and_imaginary`: draw these in place of magnitude and phase
     """
     correlated = any(pair.correlation is not None for pair in pairs)
     rows, ratios = (3, (1.6, 1.0, 0.6)) if correlated else (2, (1.6, 1.0))
@@ -200,13 +179,9 @@ def _shade(ax: Axes, band_hz: tuple[float, float], frequencies: Sequence[FloatAr
 class FlangePair:
     """A flange's receptance block, decoupled or measured, beside an identified one.
 
-    Parameters
-    ----------
-    title : str
-    frequency : array, shape (n,) [Hz]
-    values : mapping of name to complex array, shape (n, 2, 2)
-        At most three curves.
-    colours : mapping of name to str
+    `frequency` [Hz], shape (n,)
+    `values`: mapping of name to complex array, shape (n, 2, 2); at most three curves
+    `colours`: mapping of name to str
     """
 
     title: str

@@ -33,11 +33,7 @@ Deviation = dict[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]
 def tip_figure(tip: Receptance, band: tuple[float, float] | None = None) -> Figure:
     """The tooltip FRFs of both directions and those across, with two standard deviations where a spread is known.
 
-    Parameters
-    ----------
-    tip : Receptance
-    band : (float, float) [rad/s], optional
-        In which the machine is known; outside is shaded.
+    `band`: (float, float) [rad/s]; in which the machine is known; outside is shaded
     """
     tip = _thinned(tip)
     deviation = _deviation(tip)
@@ -58,11 +54,7 @@ def is_tip(receptance: Receptance) -> bool:
 def receptance_figure(receptance: Receptance, slopes: bool = False) -> Figure:
     """Magnitude and phase of a receptance, a column for each direction of the force, with two standard deviations where they are known.
 
-    Parameters
-    ----------
-    receptance : Receptance
-    slopes : bool
-        Slopes over moments in place of displacements over forces.
+    `slopes`: slopes over moments in place of displacements over forces
     """
     forces = [c for c in receptance.cols if c.dof.is_slope is slopes]
     if not forces:
@@ -119,13 +111,8 @@ def _deviation(receptance: Receptance) -> Deviation:
 def recording_figure(recording: Recording, seconds: float = 0.05, start: float | None = None) -> Figure:
     """A stretch of a recording, the channels of each quantity in a panel.
 
-    Parameters
-    ----------
-    recording : Recording
-    seconds : float [s]
-        That are drawn.
-    start : float [s], optional
-        Time of the first sample; by default they lie in the middle.
+    `seconds` [s]: that are drawn
+    `start` [s]: time of the first sample; by default they lie in the middle
     """
     time = recording.time
     start = max(0.5 * (time[-1] - seconds), 0.0) if start is None else start

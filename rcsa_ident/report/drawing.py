@@ -47,10 +47,7 @@ _LINE = 84
 class _Sheet:
     """Elements in millimetres, axis at height 0, and how far they reach.
 
-    Parameters
-    ----------
-    letters : float [mm]
-        Size of the letters; lines are a fraction of it.
+    `letters` [mm]: size of the letters; lines are a fraction of it
     """
 
     letters: float
@@ -368,14 +365,9 @@ def _safe(text: str) -> str:
 class EdgeDetail(NamedTuple):
     """A part of an outline.
 
-    Parameters
-    ----------
-    points : array, shape (n, 2) [mm]
-        r and z, from the tip up.
-    inside : float [mm]
-        Radius at which the view is cut off towards the axis; 0 is the axis.
-    scale : float
-        How many times it is drawn larger.
+    `points` [mm], shape (n, 2): r and z, from the tip up
+    `inside` [mm]: radius at which the view is cut off towards the axis; 0 is the axis
+    `scale`: how many times it is drawn larger
     """
 
     points: FloatArray
@@ -384,13 +376,7 @@ class EdgeDetail(NamedTuple):
 
 
 def edge_detail(profile: Profile, room: float) -> EdgeDetail:
-    """Return the part of an outline that is to be shown, so large that it fills about a square of `room` [mm].
-
-    Parameters
-    ----------
-    profile : Profile
-    room : float [mm]
-    """
+    """Return the part of an outline that is to be shown, so large that it fills about a square of `room` [mm]."""
     high = profile.height
     last = profile.segments[-1]
     if isinstance(last, Line) and last.z0 > 0.0 and high > _SHORT * profile.largest_radius:

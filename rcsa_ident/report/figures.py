@@ -34,13 +34,8 @@ STAGES = {
 def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
     """Measured points and the fitted cross FRF C31, magnitude and phase, a column for each tooling.
 
-    Parameters
-    ----------
-    axis : AxisResult
-    tooling : sequence of str, length k
-        Name of each cut's tooling.
-    name : str
-        X or Y.
+    `tooling`: sequence of str, length k; name of each cut's tooling
+    `name`: X or Y
     """
     omega, cut = axis.measured["omega"], np.asarray(axis.measured["cut"], dtype=int)
     value, model = (np.asarray(axis.measured[key], dtype=complex) for key in ("value", "model"))
@@ -66,15 +61,7 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
 
 
 def hammer_tests(tests: Sequence[MetTest], name: str) -> Figure:
-    """Hammer tests and the fitted receptances, magnitude and phase, a column for each test.
-
-    Parameters
-    ----------
-    tests : sequence of MetTest
-        Of one axis.
-    name : str
-        X or Y.
-    """
+    """Hammer tests and the fitted receptances, magnitude and phase, a column for each test. `tests`: of one axis. `name`: X or Y."""
     figure, grid = figure_grid(2, len(tests), 4.6, (1.6, 1.0))
     with mpl.rc_context(STYLE):
         for column, test in enumerate(tests):
@@ -165,15 +152,11 @@ def tooltip_frf(
 ) -> Figure:
     """Tooltip receptance C11, magnitude and real part, a column for each axis and one for what is across, with 2 standard deviations.
 
-    Parameters
-    ----------
-    frequency : array, shape (n,) [Hz]
-    tip : mapping of X, Y, Z, XY (motion in X under a force in Y) and the like to complex array, shape (n,) [m/N]
-    deviation : mapping of the same names to (real, imaginary) standard deviations [m/N]
-    truth : mapping of the same names to complex array, shape (n,) [m/N]
-        The true one, where it is known.
-    band_hz : (low, high) [Hz]
-        Band that was identified; what lies outside is shaded.
+    `frequency` [Hz], shape (n,)
+    `tip`: mapping of X, Y, Z, XY (motion in X under a force in Y) and the like to complex array, shape (n,) [m/N]
+    `deviation`: mapping of the same names to (real, imaginary) standard deviations [m/N]
+    `truth`: mapping of the same names to complex array, shape (n,) [m/N]; the true one, where it is known
+    `band_hz`: (low, high) [Hz]; band that was identified; what lies outside is shaded
     """
     columns = list(dict.fromkeys("across" if len(name) > 1 else name for name in tip))
     reversed_ = {name: name[::-1] for name in tip if name < name[::-1] in tip}

@@ -21,15 +21,9 @@ def force_history(
 ) -> Figure:
     """Draw a few revolutions of the estimated force, a panel for each axis, with two standard deviations.
 
-    Parameters
-    ----------
-    estimate : ForceEstimate
-    spindle_speed : float [rad/s]
-    revolutions : float
-    start : float [s], optional
-        Time of the first one drawn; by default they lie in the middle of the forces.
-    true : array, shape (n, a) [N], optional
-        A measured or simulated force, with or without its mean as the estimate.
+    `spindle_speed` [rad/s]
+    `start` [s]: time of the first one drawn; by default they lie in the middle of the forces
+    `true` [N], shape (n, a): a measured or simulated force, with or without its mean as the estimate
     """
     time = estimate.time
     length = revolutions * 2.0 * np.pi / spindle_speed
@@ -55,11 +49,7 @@ def force_history(
 def observer_frf(responses: Mapping[Dof, ObserverFRF], band: tuple[float, float]) -> Figure:
     """Draw each axis' observer (displacement to force) and the compensated response with the band of 1 dB, both in dB.
 
-    Parameters
-    ----------
-    responses : mapping of Dof to ObserverFRF
-    band : two floats [rad/s]
-        Frequencies between which forces are estimated; outside is shaded.
+    `band`: two floats [rad/s], frequencies between which forces are estimated; outside is shaded
     """
     figure, grid = figure_grid(2, len(responses), 5.2, (1.0, 1.0))
     with mpl.rc_context(STYLE):

@@ -52,29 +52,18 @@ UNTOLD = 0.5
 class ToolingPage:
     """What is shown of one tooling.
 
-    Parameters
-    ----------
-    name : str
-    recorded : bool
-        Whether the campaign has cuts with it.
-    frequency : array, shape (n,) [Hz]
-    tip : mapping of X, Y, XY (motion in X under a force in Y) or YX to complex array, shape (n,) [m/N]
-    deviation : mapping of the same names to (real, imaginary) standard deviations [m/N]
-    truth : mapping of the same names to complex array, shape (n,) [m/N], or None
-    error : mapping of the same names to float [-]
-        Difference to the truth over the norm of the direct FRF, where it is known.
-    coverage : mapping of the same names to float [-]
-        Share of the true values (real and imaginary parts) within 2 standard deviations.
-    advice : Advice or None
-        Stability limits, and what is recommended within them.
-    true_limit : array, shape (n,) [m], or None
-    band_hz : (low, high) [Hz], or None
-        Band that was identified.
-    conditions : str
-        What the lobes hold for, in words.
-    warnings : sequence of str
-    speed_rpm : float or None [rev/min]
-        Spindle speed that the tooltip FRF holds at; None where it does not change.
+    `recorded`: whether the campaign has cuts with it
+    `frequency` [Hz], shape (n,)
+    `tip`: mapping of X, Y, XY (motion in X under a force in Y) or YX to complex array, shape (n,) [m/N]
+    `deviation`: mapping of the same names to (real, imaginary) standard deviations [m/N]
+    `truth`: mapping of the same names to complex array, shape (n,) [m/N], or None
+    `error`: mapping of the same names to float [-], difference to the truth over the norm of the direct FRF, where it is known
+    `coverage`: mapping of the same names to float [-], share of the true values (real and imaginary parts) within 2 standard deviations
+    `advice`: stability limits, and what is recommended within them
+    `true_limit` [m], shape (n,)
+    `band_hz`: (low, high) [Hz], or None; band that was identified
+    `conditions`: what the lobes hold for, in words
+    `speed_rpm` [rev/min]: spindle speed that the tooltip FRF holds at; None where it does not change
     """
 
     name: str
@@ -103,17 +92,9 @@ def report_html(
 ) -> str:
     """Return the page.
 
-    Parameters
-    ----------
-    found : Identification
-    campaign : Campaign
-    readings : iterable of Reading
-        Of every cut of the campaign.
-    toolings : sequence of ToolingPage
-    seconds : mapping of stage to float
-        How long each took.
-    deviations : mapping of Dof to (array, array), optional
-        Standard deviations of each mode's natural frequency [rad/s] and damping ratio.
+    `readings`: of every cut of the campaign
+    `seconds`: mapping of stage to float, how long each took
+    `deviations`: mapping of Dof to (array, array); standard deviations of each mode's natural frequency [rad/s] and damping ratio
     """
     rows = recording_rows(readings)
     tooling_of = {cut.id: cut.tooling for cut in campaign.cuts}
@@ -153,18 +134,11 @@ def report_html(
 class ToolCard:
     """What those at the machine need of a tooling.
 
-    Parameters
-    ----------
-    tooling : Tooling
-    cut : CutSpec
-        With its feed per tooth.
-    advice : Advice
-    machine : str
-        In words.
-    tolerance, probability, reserve : float
-        Shares of speed, of the possible machines and cutting coefficients, and of depth that the recommended depth keeps.
-    versions : sequence of str
-        What it was computed from.
+    `cut`: with its feed per tooth
+    `machine`: in words
+    `tolerance`, `probability`, `reserve`: shares of speed, of the possible machines and cutting coefficients, and of depth that the
+        recommended depth keeps
+    `versions`: what it was computed from
     """
 
     tooling: Tooling

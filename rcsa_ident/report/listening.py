@@ -22,18 +22,7 @@ _POINTS, _ORDERS, _COLUMNS, _RANGE = 2000, 40, 400, 60.0
 
 
 def listening_figure(answer: Listening) -> Figure:
-    """Draw a recording and what it says.
-
-    Parameters
-    ----------
-    answer : Listening
-        With its record.
-
-    Raises
-    ------
-    InputError
-        It has none.
-    """
+    """Draw a recording and what it says. `answer`: with its record. Raises `InputError`: it has none."""
     if answer.record is None:
         raise InputError("record", "none", "what a recording says together with its samples")
     signal, rate, quantity, name = answer.record.loudest, answer.record.rate, answer.record.quantity, answer.record.name

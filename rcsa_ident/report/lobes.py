@@ -35,13 +35,7 @@ class Judged(NamedTuple):
 class Panel(NamedTuple):
     """One case: its lobes, others to compare them with, and tested cuts.
 
-    Parameters
-    ----------
-    title : str
-    lobes : StabilityLobes
-    others : mapping of name to array, shape (n,) [m]
-        Limits at the same speeds, as of idle FRFs.
-    tested : Judged or None
+    `others`: mapping of name to array, shape (n,) [m]; limits at the same speeds, as of idle FRFs
     """
 
     title: str
@@ -62,23 +56,13 @@ def stability_figure(
 ) -> Figure:
     """Stability limit and recommended depth over spindle speed, the recommended cuts marked, the chatter frequency below.
 
-    Parameters
-    ----------
-    lobes : StabilityLobes
-    recommended : sequence of OperatingPoint
-        Their depth is the limit less what a recommendation holds back.
-    true_limit : array, shape (n,) [m]
-        The true limit, where it is known.
-    tested : Judged, optional
-        Drawn over the lobes.
-    surface : SurfaceError, optional
-        Drawn below them.
-    chart : StabilityMap, optional
-        Tells the cuts that are stable above the first limit.
-    usable : UsableDepths, optional
-        The recommended depths; by default those of the lobes alone.
-    around : sequence of StabilityLobes, optional
-        Limits around the recommended cuts, with bands of their own; the lobes are then drawn as the preview that they are.
+    `recommended`: their depth is the limit less what a recommendation holds back
+    `true_limit` [m], shape (n,): the true limit, where it is known
+    `tested`: drawn over the lobes
+    `surface`: drawn below them
+    `chart`: tells the cuts that are stable above the first limit
+    `usable`: the recommended depths; by default those of the lobes alone
+    `around`: limits around the recommended cuts, with bands of their own; the lobes are then drawn as the preview that they are
     """
     rows = (2.2, 1.0) if surface is None else (2.2, 1.0, 1.0)
     figure, grid = figure_grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")

@@ -26,14 +26,7 @@ _DRAWN, _TRIANGLES = 5000, 200_000
 
 
 def part_figure(field: DexelField, path: ToolPath | None = None) -> Figure:
-    """Return the picture of what is left of a stock, axes in mm.
-
-    Parameters
-    ----------
-    field : DexelField
-    path : ToolPath or None
-        Drawn from above.
-    """
+    """Return the picture of what is left of a stock, axes in mm. `path`: drawn from above."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 4.8), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
@@ -53,18 +46,10 @@ def coloured_part_figure(
 ) -> Figure:
     """Return a part whose surface has the colour of the move that made it, and the path from above in the same colours.
 
-    Parameters
-    ----------
-    field : DexelField
-        What is left.
-    path : ToolPath
-    values : array, shape (k - 1,)
-        Of the moves; a surface that none of them made, or one without a value, is grey.
-    label : str
-    limits : tuple of float, optional
-        Of the colours, the lower one of what is worst; by default those of the values, of which the farthest from 0 is worst.
-    reach : float [m]
-        The tool's radius.
+    `field`: what is left
+    `values`, shape (k - 1,): of the moves; a surface that none of them made, or one without a value, is grey
+    `limits`: of the colours, the lower one of what is worst; by default those of the values, of which the farthest from 0 is worst
+    `reach` [m]: the tool's radius
     """
     known = values[np.isfinite(values)]
     low, high = limits if limits is not None else (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)

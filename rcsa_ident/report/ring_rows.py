@@ -18,15 +18,7 @@ _CONTACT = {
 
 
 class Change(NamedTuple):
-    """A number of the drawing, before and after.
-
-    Parameters
-    ----------
-    what, key : str
-        In words, and as the file has it.
-    before, before_std, after, after_std : float
-    unit : str
-    """
+    """A number of the drawing, before and after. `what`, `key`: in words, and as the file has it."""
 
     what: str
     key: str

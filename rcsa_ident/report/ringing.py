@@ -15,12 +15,7 @@ _PRIOR, _AFTER = "#9aa5b1", "#009E73"
 
 
 def ring_figure(found: RungTooling) -> Figure:
-    """Draw what a ring told: lines beside the modes as drawn and as learned, unknowns before and after.
-
-    Parameters
-    ----------
-    found : RungTooling
-    """
+    """Draw what a ring told: lines beside the modes as drawn and as learned, unknowns before and after."""
     known = [line for line in found.lines if line.mode is not None and line.mode.motion is Motion.BENDING and line.after is not None]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.4, 3.2 + 0.3 * len(UNKNOWNS)), layout="constrained")

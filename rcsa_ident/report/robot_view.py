@@ -34,14 +34,9 @@ class PartKind(StrEnum):
 class Part:
     """A round body along a line: limbs and spindles with rounded ends, others with flat ones.
 
-    Parameters
-    ----------
-    kind : PartKind
-    carrier : int
-        What moves it: 0 is the base, k the k-th joint.
-    points : array, shape (k, 3) [m]
-        In the carrier's axes.
-    radius : float [m]
+    `carrier`: what moves it: 0 is the base, k the k-th joint
+    `points` [m], shape (k, 3): in the carrier's axes
+    `radius` [m]
     """
 
     kind: PartKind
@@ -57,9 +52,7 @@ class Part:
 class View:
     """A direction of sight, without perspective: rows are right, up and towards who looks, in the base's axes.
 
-    Parameters
-    ----------
-    axes : array, shape (3, 3)
+    `axes`, shape (3, 3)
 
     Examples
     --------
@@ -88,11 +81,7 @@ def arm_parts(robot: RobotModel, assembly: ToolAssembly | None = None) -> tuple[
     A limb leaves its joint along that joint's axis and arrives along the next one's, as links do: between both it runs along their common
     normal.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    assembly : ToolAssembly or None
-        Tool-holder and tool at the tool point.
+    `assembly`: tool-holder and tool at the tool point
     """
     joints = robot.joints
     reach = reach_of(robot)
@@ -142,11 +131,6 @@ def arm_geometry(robot: RobotModel, assembly: ToolAssembly | None = None) -> dic
     """Return what a page needs to draw an arm at any posture: joints with their frames, and parts that these carry, in mm and degrees.
 
     Joint k stands in the axes of joint k - 1, the first one in the base's: x' = offset + turn (rotation about axis by the angle) x.
-
-    Parameters
-    ----------
-    robot : RobotModel
-    assembly : ToolAssembly or None
     """
     nose = robot.flange.then(robot.tool_point)
     length = 0.0 if assembly is None else assembly.stickout + assembly.holder_length

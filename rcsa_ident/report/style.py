@@ -51,10 +51,7 @@ STYLE: dict[Any, Any] = {
 def svg(figure: Figure, name: str) -> str:
     """Return the figure as an SVG element for a page.
 
-    Parameters
-    ----------
-    name : str
-        Prefix of its ids, which a page with several figures needs to be different; the same figure gives the same text.
+    `name`: prefix of its ids, which a page with several figures needs to be different; the same figure gives the same text
     """
     text = io.StringIO()
     with mpl.rc_context({**STYLE, "svg.hashsalt": name}):

@@ -32,13 +32,9 @@ from rcsa_ident.tool_holder.learnt import LearnedValue
 class RecordingRow:
     """One recording and its verdict.
 
-    Parameters
-    ----------
-    programmed_rpm, found_rpm : float, float or None [rev/min]
-    lines : int
-        Points of the cross FRF that it gives, both axes together.
-    signal_to_noise_db : dict of axis to float
-        Median over the lines.
+    `programmed_rpm`, `found_rpm`: float, float or None [rev/min]
+    `lines`: points of the cross FRF that it gives, both axes together
+    `signal_to_noise_db`: dict of axis to float, median over the lines
     """
 
     id: str
@@ -76,11 +72,7 @@ def recording_rows(readings: Iterable[Reading]) -> list[RecordingRow]:
 class ModeRow:
     """One mode at the flange, in the field's units; standard deviations where a posterior gives them.
 
-    Parameters
-    ----------
-    frequency_hz, damping_percent : float
-    phi_t, phi_r : complex [sqrt(s/kg)], [sqrt(s/(kg m^2))]
-    frequency_std_hz, damping_std_percent : float or None
+    `phi_t`, `phi_r`: complex [sqrt(s/kg)], [sqrt(s/(kg m^2))]
     """
 
     frequency_hz: float
@@ -94,11 +86,7 @@ class ModeRow:
 def mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None = None) -> list[ModeRow]:
     """Return a row for each mode, by frequency.
 
-    Parameters
-    ----------
-    modes : ModalModel
-    deviation : (array, array), optional
-        Standard deviations of natural frequencies [rad/s] and damping ratios, in the modes' order.
+    `deviation`: (array, array); standard deviations of natural frequencies [rad/s] and damping ratios, in the modes' order
     """
     order = np.argsort(modes.omega_n)
     deviations = [(None, None)] * order.size if deviation is None else [(to_hz(d), 100.0 * z) for d, z in zip(*deviation, strict=True)]
@@ -118,14 +106,8 @@ def mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None
 class WholeModeRow:
     """One mode of a machine whose planes feel each other, its spindle at standstill.
 
-    Parameters
-    ----------
-    frequency_hz, damping_percent : float
-    direction_deg : float
-        Of the line along which it moves the flange, from +X towards +Y.
-    phi_t, phi_r : float [sqrt(s/kg)], [sqrt(s/(kg m^2))]
-        Size of its translation and of its slope, whatever their direction.
-    frequency_std_hz, damping_std_percent : float or None
+    `direction_deg`: of the line along which it moves the flange, from +X towards +Y
+    `phi_t`, `phi_r`: float [sqrt(s/kg)], [sqrt(s/(kg m^2))]; size of its translation and of its slope, whatever their direction
     """
 
     frequency_hz: float
@@ -140,12 +122,8 @@ class WholeModeRow:
 def whole_mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None = None) -> list[WholeModeRow]:
     """Return a row for each mode of both planes, by frequency.
 
-    Parameters
-    ----------
-    modes : ModalModel
-        Translation and slope in X, then in Y.
-    deviation : (array, array), optional
-        As in `mode_rows`.
+    `modes`: translation and slope in X, then in Y
+    `deviation`: (array, array); as in `mode_rows`
     """
     angles = np.degrees(directions(modes))
     order = np.argsort(modes.omega_n)
@@ -190,13 +168,8 @@ def coefficient_rows(found: Mapping[ForceCoefficient, tuple[float, float]]) -> l
 class DrawingRow:
     """A number of a drawing before and after the cuts, as it is written.
 
-    Parameters
-    ----------
-    toolings, what, unit : str
-    drawn, spread, found, deviation : str
-        What the drawing says with its standard deviation, and what is believed now with its own.
-    hardly : bool
-        The cuts hardly taught it.
+    `drawn`, `spread`, `found`, `deviation`: what the drawing says with its standard deviation, and what is believed now with its own
+    `hardly`: the cuts hardly taught it
     """
 
     toolings: str
@@ -389,11 +362,7 @@ def _planned(cut: PlannedCut) -> dict[str, Any]:
 def entries_of(receptance: Receptance, coordinates: Sequence[Coordinate] | None = None) -> dict[str, tuple[Coordinate, Coordinate]]:
     """Return motion and force of each direct receptance under its axis' name, then of each cross term that is not zero: XY is X by Y.
 
-    Parameters
-    ----------
-    receptance : Receptance
-    coordinates : sequence of Coordinate, optional
-        Translations, one for each axis; by default all rows.
+    `coordinates`: translations, one for each axis; by default all rows
     """
     known = receptance.rows if coordinates is None else tuple(coordinates)
     found = {c.dof.upper(): (c, c) for c in known}
@@ -404,16 +373,8 @@ def entries_of(receptance: Receptance, coordinates: Sequence[Coordinate] | None 
 def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinate]) -> dict[str, Any]:
     """Return receptances over frequency with standard deviations where there are some [m/N]: of each axis, and across where planes couple.
 
-    Parameters
-    ----------
-    receptance : UncertainReceptance
-    coordinates : sequence of Coordinate
-        Translations, one for each axis.
-
-    Raises
-    ------
-    InputError
-        If a receptance is not finite.
+    `coordinates`: translations, one for each axis
+    Raises `InputError` if a receptance is not finite.
     """
     deviation = receptance.deviation()
     axes: dict[str, Any] = {}
@@ -431,13 +392,8 @@ def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinat
 def listening_row(answer: Listening, channels: Sequence[str], remarks: Sequence[str] = ()) -> dict[str, Any]:
     """Return what channels of a recording say in the units of the shop floor.
 
-    Parameters
-    ----------
-    answer : Listening
-        With its record.
-    channels : sequence of str
-    remarks : sequence of str
-        What was taken as given when the recording was opened.
+    `answer`: with its record
+    `remarks`: what was taken as given when the recording was opened
     """
     assert answer.record is not None
 
@@ -471,14 +427,7 @@ def listening_row(answer: Listening, channels: Sequence[str], remarks: Sequence[
 
 
 def tap_row(found: TapFrf, names: Sequence[str]) -> dict[str, Any]:
-    """Return what became of hammer hits.
-
-    Parameters
-    ----------
-    found : TapFrf
-    names : sequence of str
-        Of the recordings, in their order.
-    """
+    """Return what became of hammer hits. `names`: of the recordings, in their order."""
     rows = [
         {"recording": names[hit.record], "time_s": hit.time, "force_n": hit.force, "left_out": hit.reason or None} for hit in found.hits
     ]

@@ -12,12 +12,7 @@ from rcsa_ident.signals.tap import TapFrf
 
 
 def tap_figure(found: TapFrf) -> Figure:
-    """Draw a receptance from hammer hits over frequency.
-
-    Parameters
-    ----------
-    found : TapFrf
-    """
+    """Draw a receptance from hammer hits over frequency."""
     axis, rows = found.axis, 2 if found.coherence is None else 3
     frequency, size = to_hz(found.omega), np.abs(found.receptance)
     band = 2.0 * np.sqrt(found.variance)

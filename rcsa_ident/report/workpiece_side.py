@@ -11,13 +11,7 @@ from rcsa_ident.machine.workpiece_side import WorkpieceSide
 
 @dataclass(frozen=True, slots=True)
 class SideModeRow:
-    """A mode of the workpiece's side, in the field's units, with its standard deviations.
-
-    Parameters
-    ----------
-    axis : str
-    frequency_hz, frequency_std_hz, damping_percent, damping_std_percent, stiffness_n_per_um, stiffness_std_n_per_um : float
-    """
+    """A mode of the workpiece's side, in the field's units, with its standard deviations."""
 
     axis: str
     frequency_hz: float

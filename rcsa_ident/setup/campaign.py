@@ -27,30 +27,16 @@ HALF_NORMAL, HALF_NORMAL_SPREAD = 0.67, 0.95
 class HammerTest(Shown):
     """A receptance that a hammer has shown: of two points of a clamped tool, or of one and the machine's side of the flange.
 
-    Parameters
-    ----------
-    id : str
-    tooling : str
-        Key of the campaign's toolings.
-    axis : Dof
-        X or Y, of response and force.
-    response, force : float or None [m]
-        Distance of the point from the tip; None is the machine's side of the flange, where the cuts' sensors look.
-    file : Path
-    record : int or None
-        Number of the FRF in the file, from 1, where it holds several.
-    units : str or None
-        Of a file that does not tell its own, as ``um/N``.
-    standstill : bool, default True
-        The spindle did not turn.
-    sensor_mass : float, default 0 [kg]
-        Fixed to the tool-holder where the response is measured.
-    band : (float, float) [Hz]
-        Lines that are used.
-    error : float [-]
-        Standard deviation of each line beside its noise, as a share.
-    correction : Correction
-        Of an FRF that was measured with a reversed sensor, or written conjugated.
+    `tooling`: key of the campaign's toolings
+    `axis`: X or Y, of response and force
+    `response`, `force` [m]: distance of the point from the tip; None is the machine's side of the flange, where the cuts' sensors look
+    `record`: number of the FRF in the file, from 1, where it holds several
+    `units`: of a file that does not tell its own, as ``um/N``
+    `standstill`: bool, default True; the spindle did not turn
+    `sensor_mass` [kg], default 0: fixed to the tool-holder where the response is measured
+    `band`: (float, float) [Hz]; lines that are used
+    `error` [-]: standard deviation of each line beside its noise, as a share
+    `correction`: of an FRF that was measured with a reversed sensor, or written conjugated
     """
 
     id: str

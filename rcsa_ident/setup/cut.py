@@ -28,13 +28,8 @@ from rcsa_ident.setup.fields import ASKED_CUT, COEFFICIENTS, told_in_si
 class Workpiece(Shown):
     """A material and its cutting coefficients with the campaign's cutters.
 
-    Parameters
-    ----------
-    name : str
-    coefficients : CuttingCoefficients
-    edge_force_spread : float [N/m]
-        How large edge forces of which nothing is told may be: they are positive, and as normally distributed. It counts where something
-        of the campaign's drawings is not exact, too.
+    `edge_force_spread` [N/m]: how large edge forces of which nothing is told may be: they are positive, and as normally distributed. It
+        counts where something of the campaign's drawings is not exact, too.
     """
 
     name: str
@@ -161,27 +156,15 @@ def asked_cut(
 class Cut(Shown):
     """One cut, and the files that it was recorded in.
 
-    Parameters
-    ----------
-    id : str
-    tooling : str
-        Key of the campaign's toolings.
-    conditions : CuttingConditions
-        As programmed; the true speed comes from the record.
-    recording : Path
-    air : Path or None
-        The same speed without cutting.
-    last_speed : float or None [rad/s]
-        At which a pass ends whose speed changes evenly in time from that of `conditions`; None where the speed is kept. The feed per
-        tooth is kept in either case.
-    posture : tuple of float [rad]
-        Of a robot's joints; empty on any other machine.
-    started : datetime or None
-        When its recording began.
-    temperature : float or None [°C]
-        Near the spindle's bearings.
-    validation : bool
-        It is predicted, and nothing is learned from it.
+    `tooling`: key of the campaign's toolings
+    `conditions`: as programmed; the true speed comes from the record
+    `air`: the same speed without cutting
+    `last_speed` [rad/s]: at which a pass ends whose speed changes evenly in time from that of `conditions`; None where the speed is kept.
+        The feed per tooth is kept in either case.
+    `posture`: tuple of float [rad], of a robot's joints; empty on any other machine
+    `started`: datetime or None, when its recording began
+    `temperature` [°C]: near the spindle's bearings
+    `validation`: it is predicted, and nothing is learned from it
     """
 
     id: str

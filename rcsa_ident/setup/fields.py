@@ -43,14 +43,8 @@ _DEGREE = math.radians(1.0)
 class Number:
     """A number that whoever reads it holds to its limits; a `Range` in its place is held to by the noun, which names the likely slip.
 
-    Parameters
-    ----------
-    unit : str
-    size, per : float
-        The unit is `size` / `per` in SI; of the two one is 1, so that the last digit is that of one operation.
-    least, most, above : float or None [unit]
-        `above` is not allowed itself, the others are.
-    whole : bool
+    `size`, `per`: the unit is `size` / `per` in SI; of the two one is 1, so that the last digit is that of one operation
+    `least`, `most`, `above` [unit]: `above` is not allowed itself, the others are
     """
 
     unit: str = ""
@@ -92,17 +86,12 @@ Kind = Range | Number | Many | Named | tuple[str, ...] | type
 class Field:
     """A key of a noun.
 
-    Parameters
-    ----------
-    name : str
-        Of the noun's field, which is in SI.
-    key : str
-        In files and bodies of the service; options have ``-`` in place of ``_``.
-    kind : Range, Number, Many, Named, tuple of str, or str, bool or list themselves
-    default : object
-        As the key has it, in its unit; None is not told.
-    described, help, label, hint : str
-        What the service, the option of a command (keys in braces are options, too) and the field of the page say of it.
+    `name`: of the noun's field, which is in SI
+    `key`: in files and bodies of the service; options have ``-`` in place of ``_``
+    `kind`: Range, Number, Many, Named, tuple of str, or str, bool or list themselves
+    `default`: as the key has it, in its unit; None is not told
+    `described`, `help`, `label`, `hint`: what the service, the option of a command (keys in braces are options, too) and the field of the
+        page say of it
     """
 
     name: str

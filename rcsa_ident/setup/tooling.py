@@ -99,11 +99,6 @@ class BareCutter(Tooling):
     """A cutter alone, where the tip of the tool that carries it is known by itself: from modes, tap tests or labelled cuts.
 
     Whoever asks for the tool and its holder is told that there are none.
-
-    Parameters
-    ----------
-    name : str
-    cutter : Cutter
     """
 
     def __init__(self, name: str, cutter: Cutter) -> None:

@@ -20,10 +20,7 @@ BAND, _RATE = 5000.0, 12000.0
 def loud_part(samples: FloatArray, rate: float) -> slice:
     """Return the longest stretch that is loud and even: without silence, entry and exit; all of a record that is even.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
+    `samples`, shape (n, c); `rate` [Hz]
     """
     n = samples.shape[0]
     length = max(round(_WINDOW * rate), 1)
@@ -55,10 +52,7 @@ def _longest(wanted: np.ndarray) -> tuple[int, int]:
 def decimated(samples: FloatArray, rate: float) -> tuple[FloatArray, float, float]:
     """Return samples at a rate that is high enough for `BAND`, that rate [Hz], and the band that is left [Hz].
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
+    `samples`, shape (n, c); `rate` [Hz]
     """
     factor = int(rate / _RATE)
     if factor < 2:

@@ -20,18 +20,9 @@ def align(cut: ComplexArray, air: ComplexArray, teeth: int, highest: int = 16) -
     Only orders that the teeth do not share carry it: run-out and roundness of the flange. Cutter run-out adds force on
     them; what it leaves unexplained widens the standard deviation.
 
-    Parameters
-    ----------
-    cut, air : complex arrays, shape (orders, axes) [m]
-        Lines of both records, orders from 0.
-    teeth : int
-    highest : int
-        Highest order that is looked at.
-
-    Returns
-    -------
-    (float, float) [rad]
-        The angle in [0, 2 pi); a standard deviation of pi / sqrt(3) where it cannot be told.
+    `cut`, `air` [m], shape (orders, axes): lines of both records, orders from 0
+    `highest`: highest order that is looked at
+    Returns (float, float) [rad]: the angle in [0, 2 pi); a standard deviation of pi / sqrt(3) where it cannot be told.
     """
     order, cross = _overlap(cut, air, teeth, highest)
     unknown = 0.0, np.pi / np.sqrt(3.0)
@@ -67,21 +58,11 @@ def trigger_edge(
     the time lies in what all bounds share, as wide as it is. Where edges jitter by more than a sample nothing is shared
     and their mean is taken.
 
-    Parameters
-    ----------
-    recording : Recording
-    speed : float [rad/s]
-        Spindle speed, as found in the record.
-    window : slice
-        Where the speed was found, if not in the whole record.
-    deviation : array [rad], optional
-        Of the spindle's angle in the window from that at this speed, where it does not turn evenly; the time is that at which the edge
-        would come if it did.
-
-    Returns
-    -------
-    (float, float) [s] or None
-        None without a trigger, or if its edges do not come at the spindle's pace.
+    `speed` [rad/s]: spindle speed, as found in the record
+    `window`: slice, where the speed was found, if not in the whole record
+    `deviation` [rad]: of the spindle's angle in the window from that at this speed, where it does not turn evenly; the time is that at
+        which the edge would come if it did
+    Returns (float, float) [s], or None without a trigger, or if its edges do not come at the spindle's pace.
     """
     found = recording.channel(Quantity.TRIGGER, None, window)
     if found is None:
@@ -115,11 +96,6 @@ def angle_to_air(cut: SteadyRecord, air: SteadyRecord, teeth: int) -> tuple[floa
     """Return the angle by which the air cut must be turned to lie under the cut, and its standard deviation [rad].
 
     From the triggers where both recordings have one, else from the flange's profile.
-
-    Parameters
-    ----------
-    cut, air : SteadyRecord
-    teeth : int
     """
     edges = [trigger_edge(each.recording, each.spindle_speed, *followed(each)) for each in (cut, air)]
     if edges[0] is None or edges[1] is None:
@@ -141,16 +117,9 @@ def trigger_delay(
     several pulses a turn both are known only up to the time between them, which is enough where a whole number of teeth
     passes in it. None without a trigger that helps.
 
-    Parameters
-    ----------
-    recording : Recording
-    speed : float [rad/s]
-        Spindle speed, as found in the record.
-    teeth : int
-    window : slice
-        Where the speed was found, if not in the whole record.
-    deviation : array [rad], optional
-        As in `trigger_edge`.
+    `speed` [rad/s]: spindle speed, as found in the record
+    `window`: slice, where the speed was found, if not in the whole record
+    `deviation` [rad]: as in `trigger_edge`
     """
     edge = trigger_edge(recording, speed, window, deviation)
     sensor = None if edge is None else _trigger(recording)

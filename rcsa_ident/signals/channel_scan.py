@@ -25,16 +25,10 @@ _NEW_VALUES = (np.inf, np.inf, -np.inf, -np.inf, np.nan, np.inf, np.nan)
 class ChannelScan:
     """What all samples of a channel say together.
 
-    Parameters
-    ----------
-    lost, first_lost : int
-        Number of samples that are no finite number, and the first of them.
-    low, high, first : float
-        Of those that are; `low` is above `high` where there is none.
-    clipped : int
-        Samples that stand at a limit.
-    frozen : (int, int) or None
-        Start and length of the longest run that a live channel does not produce.
+    `lost`, `first_lost`: number of samples that are no finite number, and the first of them
+    `low`, `high`, `first`: of those that are; `low` is above `high` where there is none
+    `clipped`: samples that stand at a limit
+    `frozen`: (int, int) or None; start and length of the longest run that a live channel does not produce
     """
 
     lost: int

@@ -17,26 +17,19 @@ from rcsa_ident.signals.steady import SteadyRecord
 class AxisLines:
     """Lines of one axis at the tooth-passing harmonics of one cut.
 
-    Parameters
-    ----------
-    order : array of int, shape (n,)
-        Multiples of the spindle frequency.
-    omega : array, shape (n,) [rad/s]
-    cut, air : complex arrays, shape (n, o) [m/N]
-        Displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air cut's line is turned
-        by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's absolute
-        motion, or that alone, where `shares` does not tell otherwise.
-    variance : array, shape (n, o) [m^2/N^2]
-        Of the real and of the imaginary part of cut - air each.
-    coherence : array, shape (n,) [-]
-        Of the flange's motion.
-    force : complex array, shape (n,) [N]
-    force_slope : complex array, shape (n, 5) [-]
-        Change of the force's logarithm with `cutting.force.SLOPES`.
-    across, across_slope : complex arrays of the same shapes, or None
-        The force along the other machine axis in the same lines, with tooth 1 at immersion 0, too; None where it is not told.
-    shares : array, shape (o, 1 + e) or (0, 0) [-]
-        What of the flange's motion, and of that of other places of the machine, is in each output (`motion.shares_of`).
+    `order`: array of int, shape (n,); multiples of the spindle frequency
+    `omega` [rad/s], shape (n,)
+    `cut`, `air` [m/N], shape (n, o): displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air cut's
+        line is turned by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's
+        absolute motion, or that alone, where `shares` does not tell otherwise.
+    `variance` [m^2/N^2], shape (n, o): of the real and of the imaginary part of cut - air each
+    `coherence` [-], shape (n,): of the flange's motion
+    `force` [N], shape (n,)
+    `force_slope` [-], shape (n, 5): change of the force's logarithm with `cutting.force.SLOPES`
+    `across`, `across_slope`: complex arrays of the same shapes, or None; the force along the other machine axis in the same lines, with
+        tooth 1 at immersion 0, too; None where it is not told
+    `shares`: array, shape (o, 1 + e) or (0, 0) [-]; what of the flange's motion, and of that of other places of the machine, is in each
+        output (`motion.shares_of`)
     """
 
     order: np.ndarray
@@ -158,10 +151,7 @@ class AirCorrectedSpectra:
     What cut and air cut share at an order goes only as far as it is uncorrelated with what the force does there; at the
     few harmonics where the flange's roundness reaches them this leaves a bias that `LineEstimator` does not have.
 
-    Parameters
-    ----------
-    segments : int
-        Half-overlapping Hann segments of each record.
+    `segments`: half-overlapping Hann segments of each record
     """
 
     segments: int = 8
@@ -197,12 +187,8 @@ class AirCorrectedSpectra:
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
     """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where there is no such order.
 
-    Parameters
-    ----------
-    air : SteadyRecord
-    angle : float [rad]
-    highest : int
-        Highest order that is returned.
+    `angle` [rad]
+    `highest`: highest order that is returned
     """
     return turned(air.flange, air.variance, angle, highest)
 
@@ -210,13 +196,9 @@ def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexAr
 def turned(lines: ComplexArray, noise: FloatArray, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
     """Return lines turned by an angle, and their variance, orders 0..highest; 0 where there is no such order.
 
-    Parameters
-    ----------
-    lines : complex array, shape (orders, ...)
-    noise : array of the same shape
-        Their variance.
-    angle : float [rad]
-    highest : int
+    `lines`, shape (orders, ...)
+    `noise`: array of the same shape, their variance
+    `angle` [rad]
     """
     rest = [(0, 0)] * (lines.ndim - 1)
     missing = max(highest + 1 - lines.shape[0], 0)
@@ -254,10 +236,8 @@ def air_corrected(displacement: ComplexArray, force: ComplexArray, air: ComplexA
     Spectra are subtracted, not lines: what the air cut shares with the cut is only taken out in the mean, which is
     exact where both are uncorrelated.
 
-    Parameters
-    ----------
-    displacement, force, air : complex arrays, shape (segments, ...) [m], [N], [m]
-        Spectra of the segments of a cut, of its force and of its air cut.
+    `displacement`, `force`, `air`: complex arrays, shape (segments, ...) [m], [N], [m]; spectra of the segments of a cut, of its force and
+        of its air cut
     """
     return (_mean(displacement, displacement) - _mean(air, air)) / (_mean(force, displacement) - _mean(force, air))
 

@@ -61,12 +61,8 @@ class Heard(StrEnum):
 class Event(NamedTuple):
     """Something that happens in a recording.
 
-    Parameters
-    ----------
-    kind : str
-        ``entry``, ``exit``, ``overload`` or ``drop-out``.
-    time : float or None [s]
-        None where it is not told.
+    `kind`: ``entry``, ``exit``, ``overload`` or ``drop-out``
+    `time` [s]: None where it is not told
     """
 
     kind: str
@@ -76,14 +72,9 @@ class Event(NamedTuple):
 class Record(NamedTuple):
     """What was listened to.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-        Lost samples are filled.
-    rate : float [Hz]
-    quantity : Quantity
-    name : str
-        Of the recording.
+    `samples`, shape (n, c): lost samples are filled
+    `rate` [Hz]
+    `name`: of the recording
     """
 
     samples: FloatArray
@@ -191,25 +182,14 @@ def listen(
 ) -> Listening:
     """Return what a recording says: speed, teeth, verdict, chatter and speeds to try.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-        Channels of one quantity, without lost samples.
-    rate : float [Hz]
-    quantity : Quantity
-        What the channels measure. Which of the chatter's lines is the structure's is told by the motion, also of accelerations; sound
-        is taken as it is heard. A displacement is mostly run-out and roundness, which are there in the air, too.
-    teeth : int or None
-        As told; else they are found from the lines.
-    spindle_speed : float or None [rad/s]
-        As programmed; the true one is looked for near it.
-    between : (float, float) or None [rad/s]
-        Speeds that the machine may turn at: where it is looked for, and suggested.
-
-    Raises
-    ------
-    InputError
-        The record is too short, or nothing moves in it.
+    `samples`, shape (n, c): channels of one quantity, without lost samples
+    `rate` [Hz]
+    `quantity`: what the channels measure. Which of the chatter's lines is the structure's is told by the motion, also of accelerations;
+        sound is taken as it is heard. A displacement is mostly run-out and roundness, which are there in the air, too.
+    `teeth`: as told; else they are found from the lines
+    `spindle_speed` [rad/s]: as programmed; the true one is looked for near it
+    `between`: (float, float) or None [rad/s]; speeds that the machine may turn at: where it is looked for, and suggested
+    Raises `InputError`: the record is too short, or nothing moves in it.
 
     Examples
     --------
@@ -356,13 +336,7 @@ def _beside(
 def stands_beside(part: FloatArray, rate: float, rotation: Rotation, quantity: Quantity, teeth: int | None) -> tuple[OffOrders, float]:
     """Return the lines beside the orders of a part whose rotation is known, and the share of it that the orders explain.
 
-    Parameters
-    ----------
-    part : array, shape (n, c)
-    rate : float [Hz]
-    rotation : Rotation
-    quantity : Quantity
-    teeth : int or None
+    `part`, shape (n, c); `rate` [Hz]
     """
     band = min(BAND, 0.5 * rate)
     lines, rotation, _ = _lines(part, rate, band, rotation, rate < UNFILTERED and quantity is not Quantity.SOUND)
@@ -372,14 +346,9 @@ def stands_beside(part: FloatArray, rate: float, rotation: Rotation, quantity: Q
 def heard_in_a_cut(part: FloatArray, rate: float, rotation: Rotation, teeth: int) -> Remark | None:
     """Return what accelerometers hear that speaks against a stable cut, None where nothing does.
 
-    Parameters
-    ----------
-    part : array, shape (n, c) [m/s^2]
-        The loud part of a record.
-    rate : float [Hz]
-    rotation : Rotation
-        Of the spindle in it.
-    teeth : int
+    `part` [m/s^2], shape (n, c): the loud part of a record
+    `rate` [Hz]
+    `rotation`: of the spindle in it
     """
     lines, rotation, _ = _lines(part, rate, min(BAND, 0.5 * rate), rotation, rate < UNFILTERED)
     beside = _beside(part, rate, lines, rotation, min(BAND, 0.5 * rate), Quantity.ACCELERATION, teeth)

@@ -49,26 +49,16 @@ HOUSING = Remark(
 class CutMeasurement:
     """What one cut says about the cross FRF.
 
-    Parameters
-    ----------
-    cut_id, tooling : str
-        Name of the cut and of its tooling.
-    spindle_speed : float [rad/s]
-        As found in the record.
-    axes : mapping of Dof to AxisLines
-    alignment_std : float [rad]
-        Standard deviation of the angle between cut and air cut; 0 without an air cut.
-    delay, delay_std : float or None [s]
-        When tooth 1 stood at immersion 0, from a trigger whose tooth angle is known; else the time of the trigger's edge.
-    tooth_angle_known : bool
-    clamping : str
-        Cuts of one such name share the unknown angle between the time that `delay` tells and immersion 0; by default the tooling's.
-    acceleration : float [rad/s^2]
-        By which the spindle speed changes, in the window of a pass: the lines are means over the frequencies that it sweeps.
-    length : float [s]
-        Of that window; 0 of a whole record.
-    workpiece : mapping of Dof to AxisLines
-        What accelerometers on table or workpiece show, over the force on the tool: minus what gives way there.
+    `cut_id`, `tooling`: name of the cut and of its tooling
+    `spindle_speed` [rad/s]: as found in the record
+    `alignment_std` [rad]: standard deviation of the angle between cut and air cut; 0 without an air cut
+    `delay`, `delay_std` [s]: when tooth 1 stood at immersion 0, from a trigger whose tooth angle is known; else the time of the trigger's
+        edge
+    `clamping`: cuts of one such name share the unknown angle between the time that `delay` tells and immersion 0; by default the tooling's
+    `acceleration` [rad/s^2]: by which the spindle speed changes, in the window of a pass: the lines are means over the frequencies that it
+        sweeps
+    `length` [s]: of that window; 0 of a whole record
+    `workpiece`: what accelerometers on table or workpiece show, over the force on the tool: minus what gives way there
     """
 
     cut_id: str
@@ -94,18 +84,10 @@ class CutMeasurement:
 class Reading(Shown):
     """A cut whose recordings were read: their verdict and, where they are usable, the measurement.
 
-    Parameters
-    ----------
-    cut_id, tooling : str
-    programmed_speed : float [rad/s]
-        In the middle of a pass.
-    verdict : Verdict
-    measurements : tuple of CutMeasurement
-        One of a cut that keeps its speed, one for each window of a pass, none of a cut that is not usable.
-    spindle_speed : float or None [rad/s]
-        As found in the record, also in one that is not usable, unless nothing can be told of it.
-    harmonics : mapping of Dof to int
-        Multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them.
+    `programmed_speed` [rad/s]: in the middle of a pass
+    `measurements`: one of a cut that keeps its speed, one for each window of a pass, none of a cut that is not usable
+    `spindle_speed` [rad/s]: as found in the record, also in one that is not usable, unless nothing can be told of it
+    `harmonics`: multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them
     """
 
     cut_id: str
@@ -140,28 +122,14 @@ def measure_cut(
 ) -> Reading:
     """Return the cross FRF's points of one cut, or why there are none.
 
-    Parameters
-    ----------
-    cut_id, tooling : str
-        Name of the cut and of its tooling, for the result and for messages.
-    cut : Recording
-        Displacement channels for X and/or Y, accelerometers of the fixture where there are some, and accelerometers on the spindle's
-        housing beside them or in their place.
-    air : Recording or None
-        The same in the air, where it was recorded.
-    cutter : Cutter
-    conditions : CuttingConditions
-        The cut as programmed; forces are simulated at the speed found in the record.
-    coefficients : CuttingCoefficients
-    max_frequency : float [Hz]
-        Highest line.
-    estimator : Estimator
-        `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess].
-
-    Raises
-    ------
-    InputError
-        If no such channel is there, or the air cut lacks one.
+    `cut_id`, `tooling`: name of the cut and of its tooling, for the result and for messages
+    `cut`: displacement channels for X and/or Y, accelerometers of the fixture where there are some, and accelerometers on the spindle's
+        housing beside them or in their place
+    `air`: the same in the air, where it was recorded
+    `conditions`: the cut as programmed; forces are simulated at the speed found in the record
+    `max_frequency` [Hz]: highest line
+    `estimator`: `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess]
+    Raises `InputError` if no such channel is there, or the air cut lacks one.
     """
     axes = measured_axes(cut.sensors)
     if not axes:
@@ -249,20 +217,10 @@ def cross_lines(
 ) -> dict[Dof, AxisLines]:
     """Return the lines of each axis over the simulated force, without those at which the force says nothing.
 
-    Parameters
-    ----------
-    steady : SteadyRecord
-    still : SteadyRecord or None
-        Of the air cut.
-    angle : float [rad]
-        By which that must be turned to lie under the cut.
-    harmonic : array of int, shape (n,)
-        Orders of the lines.
-    cutter : Cutter
-    conditions : CuttingConditions
-        As programmed; the speed is that of the record.
-    coefficients : CuttingCoefficients
-    estimator : Estimator
+    `still`: of the air cut
+    `angle` [rad]: by which that must be turned to lie under the cut
+    `harmonic`: array of int, shape (n,); orders of the lines
+    `conditions`: as programmed; the speed is that of the record
     """
     axes, speed = steady.axes, steady.spindle_speed
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
@@ -304,18 +262,9 @@ def workpiece_lines(
 def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
 
-    Parameters
-    ----------
-    air : Recording
-    conditions : CuttingConditions
-        The cut as programmed: its speed counts.
-    max_frequency : float [Hz]
-        Highest line.
-
-    Raises
-    ------
-    InputError
-        If there is neither a displacement channel nor an accelerometer on the spindle's housing.
+    `conditions`: the cut as programmed: its speed counts
+    `max_frequency` [Hz]: highest line
+    Raises `InputError` if there is neither a displacement channel nor an accelerometer on the spindle's housing.
     """
     axes, programmed = measured_axes(air.sensors), conditions.spindle_speed
     if not axes:
@@ -405,10 +354,8 @@ def _chatter(
 def fits_by_chance(cuts: Sequence[tuple[str, bool | None]]) -> list[Remark | None]:
     """Return the reason against each cut that fits a tooth count which most cuts of its tooling contradict, else None.
 
-    Parameters
-    ----------
-    cuts : sequence of (tooling, whether the tooth count fits)
-        None of a cut that was left out for another reason: it says nothing of the tooth count.
+    `cuts`: sequence of (tooling, whether the tooth count fits); None of a cut that was left out for another reason: it says nothing of the
+        tooth count
     """
     against, fitting = (Counter(tooling for tooling, fits in cuts if fits is each) for each in (False, True))
 

@@ -19,14 +19,9 @@ FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE = frozen([[1.0]]), frozen([[1.0, -1.0],
 def shares_of(of_flange: bool, fixture: bool, housing: int) -> FloatArray:
     """Return what of the flange's motion and of that of e other places is in each output of an axis, shape (o, 1 + e) [-].
 
-    Parameters
-    ----------
-    of_flange : bool
-        Whether a displacement sensor shows the flange: absolutely, or relative to its fixture.
-    fixture : bool
-        Whether an accelerometer shows the motion of that fixture; it is the second output then, and the first other place.
-    housing : int
-        Number of accelerometers on the spindle's housing, each at a place of its own, behind these.
+    `of_flange`: whether a displacement sensor shows the flange: absolutely, or relative to its fixture
+    `fixture`: whether an accelerometer shows the motion of that fixture; it is the second output then, and the first other place
+    `housing`: number of accelerometers on the spindle's housing, each at a place of its own, behind these
 
     Examples
     --------
@@ -49,10 +44,7 @@ def usual_shares(outputs: int) -> FloatArray:
 def searched(shares: FloatArray) -> slice:
     """Return the outputs whose sum a search looks for: those that are the flange's motion together, or the first one.
 
-    Parameters
-    ----------
-    shares : array, shape (o, 1 + e) [-]
-        As `shares_of` returns them.
+    `shares` [-], shape (o, 1 + e): as `shares_of` returns them
     """
     first, *others = shares[:2].sum(axis=0)
     return slice(0, 2 if shares.shape[0] > 1 and first == 1.0 and not any(others) else 1)
@@ -66,21 +58,11 @@ _LEAST_APART = float(np.radians(30.0))
 class MotionChannels:
     """The channels of a recording that show motion along the machine's axes: each is an output.
 
-    Parameters
-    ----------
-    axes : tuple of Dof
-    columns : tuple of int
-        Of the recording: the axes' own channels, then the accelerations of the displacement sensors' fixture, then further ones of the
-        spindle's housing.
-    sensors : tuple of Sensor
-        Of these columns.
-    fixed : int
-        Number of those of the fixture.
-
-    Raises
-    ------
-    InputError
-        If sensors are turned out of the machine's axes, and there are none for the other axis to turn them back with.
+    `columns`: of the recording: the axes' own channels, then the accelerations of the displacement sensors' fixture, then further ones of
+        the spindle's housing
+    `sensors`: of these columns
+    `fixed`: number of those of the fixture
+    Raises `InputError` if sensors are turned out of the machine's axes, and there are none for the other axis to turn them back with.
     """
 
     axes: tuple[Dof, ...]
@@ -162,19 +144,10 @@ def measured_axes(sensors: Sequence[Sensor]) -> tuple[Dof, ...]:
 def motion_channels(sensors: Sequence[Sensor], axes: Sequence[Dof], housing: bool = True) -> MotionChannels:
     """Return the channels that show motion along these axes.
 
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-        One of each column of a recording.
-    axes : sequence of Dof
-        As `measured_axes` returns them.
-    housing : bool
-        Accelerometers on the housing beside displacement sensors are among them.
-
-    Raises
-    ------
-    InputError
-        If an axis has no sensor, or if some are turned and cannot be turned back.
+    `sensors`: one of each column of a recording
+    `axes`: as `measured_axes` returns them
+    `housing`: accelerometers on the housing beside displacement sensors are among them
+    Raises `InputError` if an axis has no sensor, or if some are turned and cannot be turned back.
     """
     shown = [first_sensor(sensors, Quantity.DISPLACEMENT, axis) for axis in axes]
     felt = [accelerometers(sensors, axis, Role.SPINDLE) for axis in axes]
@@ -195,15 +168,8 @@ def workpiece_channels(sensors: Sequence[Sensor]) -> MotionChannels | None:
 
     They are moved by the force on the workpiece, which is minus that on the tool: what they show has nothing of the spindle's motion.
 
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-        One of each column of a recording.
-
-    Raises
-    ------
-    InputError
-        If an axis has several, or if some are turned and cannot be turned back.
+    `sensors`: one of each column of a recording
+    Raises `InputError` if an axis has several, or if some are turned and cannot be turned back.
     """
     chosen = []
     for axis in (Dof.X, Dof.Y):

@@ -33,22 +33,14 @@ class LineSpectrum:
     x(t) = Re sum_m amplitude[m] e^{i m (Omega t + deviation)} + slow drift + lines beside the orders + rest, t from the record's first
     sample.
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-    amplitude : complex array, shape (m + 1, c) [channel's unit]
-        Orders 0..m.
-    variance : array, shape (m + 1, c)
-        Variance of the real and of the imaginary part each, from the noise floor beside each line.
-    scatter : array, shape (m + 1, c)
-        The same variance from the scatter between quarters of the record.
-    rest : array, shape (n, c)
-        What is left of the record without lines and drift.
-    rate : float [Hz]
-    beside : array, shape (s,) [rad/s]
-        Frequencies of lines that stand beside the orders: the mains' hum, chatter.
-    beside_signal : array, shape (n, c), or None
-        What they are in the record, where there are some.
+    `spindle_speed` [rad/s]
+    `amplitude` [channel's unit], shape (m + 1, c): orders 0..m
+    `variance`, shape (m + 1, c): variance of the real and of the imaginary part each, from the noise floor beside each line
+    `scatter`, shape (m + 1, c): the same variance from the scatter between quarters of the record
+    `rest`, shape (n, c): what is left of the record without lines and drift
+    `rate` [Hz]
+    `beside` [rad/s], shape (s,): frequencies of lines that stand beside the orders: the mains' hum, chatter
+    `beside_signal`, shape (n, c): what they are in the record, where there are some
     """
 
     spindle_speed: float
@@ -114,16 +106,10 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
 
     A zero-padded spectrum is scanned near the nominal speed; `follow_speed` takes over from there.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-        Displacements, without lost samples.
-    rate : float [Hz]
-    nominal : float [rad/s]
-    orders : int
-        Highest multiple that is looked at.
-    search : float
-        Share of the nominal speed within which the true one is looked for.
+    `samples`, shape (n, c): displacements, without lost samples
+    `rate` [Hz]; `nominal` [rad/s]
+    `orders`: highest multiple that is looked at
+    `search`: share of the nominal speed within which the true one is looked for
     """
     n = samples.shape[0]
     nominal_hz = nominal / (2.0 * np.pi)
@@ -152,17 +138,11 @@ def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16
     In each of up to eight blocks the lines are fitted; the speed is the one at which all blocks tell the same amplitudes
     and phases. Blocks hold whole revolutions, so that orders above `orders` do not leak in.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-        Displacements, without lost samples.
-    rate : float [Hz]
-    near : float [rad/s]
-        The guess.
-    orders : int
-        Highest multiple that is fitted.
-    deviation : array, shape (n,) [rad], optional
-        Of the spindle's angle from that at a constant speed.
+    `samples`, shape (n, c): displacements, without lost samples
+    `rate` [Hz]
+    `near` [rad/s]: the guess
+    `orders`: highest multiple that is fitted
+    `deviation` [rad], shape (n,): of the spindle's angle from that at a constant speed
     """
     step = near / rate
     highest = int(min(orders, 0.9 * np.pi / step))
@@ -228,14 +208,8 @@ def line_spectrum(
     Lines and a slow drift (a polynomial) are fitted together, and with them lines beside the orders that stand far above the noise
     (mains' hum): else these would leak into all orders. Short stretches in which something knocked are left out.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    spindle_speed : float [rad/s]
-    max_frequency : float [Hz]
-    deviation : array, shape (n,) [rad], optional
-        Of the spindle's angle from that at this speed, where it does not turn evenly.
+    `samples`, shape (n, c); `rate` [Hz]; `spindle_speed` [rad/s]; `max_frequency` [Hz]
+    `deviation` [rad], shape (n,): of the spindle's angle from that at this speed, where it does not turn evenly
     """
     n = samples.shape[0]
     comb = Comb(spindle_speed / rate, deviation)
@@ -349,20 +323,11 @@ def segment_lines(
 ) -> ComplexArray:
     """Return amplitudes at multiples of the spindle's angle in half-overlapping Hann segments [welch1967], phases from the record's start.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    spindle_speed : float [rad/s]
-    order : array of int, shape (m,)
-    segments : int
-        Number of segments.
-    deviation : array, shape (n,) [rad], optional
-        As in `line_spectrum`.
-
-    Returns
-    -------
-    complex array, shape (segments, m, c)
+    `samples`, shape (n, c); `rate` [Hz]; `spindle_speed` [rad/s]
+    `order`: array of int, shape (m,)
+    `segments`: number of segments
+    `deviation` [rad], shape (n,): as in `line_spectrum`
+    Returns a complex array of shape (segments, m, c).
     """
     n = samples.shape[0]
     length = 2 * n // (segments + 1)
@@ -424,10 +389,7 @@ def _floor(rest: FloatArray, step: float, highest: int) -> FloatArray:
 def envelope(signal: FloatArray, points: int) -> tuple[int, FloatArray, FloatArray]:
     """Return samples per interval, and the smallest and largest value in each of at most `points` intervals, shape (p,).
 
-    Parameters
-    ----------
-    signal : array, shape (n,)
-    points : int
+    `signal`, shape (n,)
     """
     width = max(-(-signal.size // points), 1)
     starts = np.arange(0, signal.size, width)
@@ -437,12 +399,8 @@ def envelope(signal: FloatArray, points: int) -> tuple[int, FloatArray, FloatArr
 def mean_spectrum(signal: FloatArray, rate: float, seconds: float = 2.0) -> tuple[FloatArray, FloatArray]:
     """Return frequencies [Hz] and amplitudes, shape (m,), of a record: root mean square over windows that overlap by half.
 
-    Parameters
-    ----------
-    signal : array, shape (n,)
-    rate : float [Hz]
-    seconds : float
-        Length of a window; that of the record where it is shorter.
+    `signal`, shape (n,); `rate` [Hz]
+    `seconds`: length of a window; that of the record where it is shorter
     """
     length = int(min(seconds * rate, signal.size))
     window = hann(length)
@@ -455,14 +413,9 @@ def mean_spectrum(signal: FloatArray, rate: float, seconds: float = 2.0) -> tupl
 def spectrogram(signal: FloatArray, rate: float, columns: int, seconds: float = 0.1) -> tuple[float, FloatArray]:
     """Return the step of frequency [Hz] and the level [dB], shape (m, c), of windows that follow each other.
 
-    Parameters
-    ----------
-    signal : array, shape (n,)
-    rate : float [Hz]
-    columns : int
-        Most of them; fewer where they would overlap by more than three quarters.
-    seconds : float
-        Length of a window.
+    `signal`, shape (n,); `rate` [Hz]
+    `columns`: most of them; fewer where they would overlap by more than three quarters
+    `seconds`: length of a window
     """
     length = int(min(max(seconds * rate, 64), signal.size))
     window = hann(length)

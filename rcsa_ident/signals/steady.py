@@ -29,26 +29,16 @@ LEAST_REVOLUTIONS = 8.0
 class SteadyRecord:
     """The steady part of a recording.
 
-    Parameters
-    ----------
-    recording : Recording
-    channels : MotionChannels
-        Those of the recording that matter: of the machine's axes with a displacement sensor; where there is none, of those with an
-        accelerometer on the spindle's housing.
-    window, part : slice
-        What was looked at (all of a recording that is not long, see `steady_window`), and the steady part in it.
-    teeth : int
-        1 for an air cut.
-    lines : LineSpectrum
-        Lines of these channels; phases from the recording's first sample.
-    deviation : array or None, shape (n,) [rad]
-        Of the spindle's angle in the steady part from that at its mean speed; None where it turns evenly.
-    outputs : complex array, shape (orders, channels) [m]
-        Displacement that each of them shows.
-    output_variance : array, shape (orders, channels) [m^2]
-        Variance of the real and of the imaginary part each.
-    rotation : Rotation or None
-        Of the spindle in the steady part, as accelerometers on the housing told it; None where the flange's displacement did.
+    `channels`: those of the recording that matter: of the machine's axes with a displacement sensor; where there is none, of those with an
+        accelerometer on the spindle's housing
+    `window`, `part`: slice, what was looked at (all of a recording that is not long, see `steady_window`), and the steady part in it
+    `teeth`: 1 for an air cut
+    `lines`: lines of these channels; phases from the recording's first sample
+    `deviation`: array or None, shape (n,) [rad]; of the spindle's angle in the steady part from that at its mean speed; None where it turns
+        evenly
+    `outputs` [m], shape (orders, channels): displacement that each of them shows
+    `output_variance` [m^2], shape (orders, channels): variance of the real and of the imaginary part each
+    `rotation`: of the spindle in the steady part, as accelerometers on the housing told it; None where the flange's displacement did
     """
 
     recording: Recording
@@ -150,28 +140,14 @@ def steady_record(
 ) -> SteadyRecord:
     """Return the steady part of a recording with its speed and lines.
 
-    Parameters
-    ----------
-    recording : Recording
-    axes : sequence of Dof
-        As `measured_axes` returns them.
-    programmed : float [rad/s]
-        The spindle speed that was set; the true one is looked for near it.
-    max_frequency : float [Hz]
-        Highest line.
-    teeth : int
-        1 for an air cut.
-    whole : bool
-        Look at all of a long recording, not at a window, and take its speed as constant: for who goes through all of it so.
-    housing : bool
-        Accelerometers on the housing beside displacement sensors are read, too.
-
-    Raises
-    ------
-    InputError
-        If the displacement of an axis is missing, or as `MotionChannels`.
-    Unsteady
-        If there is no steady part; what was found says why.
+    `axes`: as `measured_axes` returns them
+    `programmed` [rad/s]: the spindle speed that was set; the true one is looked for near it
+    `max_frequency` [Hz]: highest line
+    `teeth`: 1 for an air cut
+    `whole`: look at all of a long recording, not at a window, and take its speed as constant: for who goes through all of it so
+    `housing`: accelerometers on the housing beside displacement sensors are read, too
+    Raises `InputError` if the displacement of an axis is missing, or as `MotionChannels`.
+    Raises `Unsteady` if there is no steady part; what was found says why.
     """
     rate, n = recording.rate, recording.samples.shape[0]
     least = LEAST_REVOLUTIONS * 2.0 * np.pi / programmed * rate

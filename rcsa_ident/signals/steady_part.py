@@ -30,13 +30,8 @@ def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: i
     The median is that of the blocks' energy, so that a cut is found in a record that is mostly air. A stretch that
     begins or ends within the record loses a block there, where entry or exit may reach into it.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    spindle_speed : float [rad/s]
-    teeth : int
-        1 for an air cut.
+    `samples`, shape (n, c); `rate` [Hz]; `spindle_speed` [rad/s]
+    `teeth`: 1 for an air cut
     """
     n = samples.shape[0]
     length = _block_length(rate, spindle_speed)
@@ -51,15 +46,9 @@ def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: i
 def steady_window(recording: Recording, columns: Sequence[int], spindle_speed: float, teeth: int) -> slice:
     """Return the `LONGEST` samples in the middle of a long recording's longest steady stretch, found block by block; all of a shorter one.
 
-    Parameters
-    ----------
-    recording : Recording
-    columns : sequence of int
-        Channels of the displacements.
-    spindle_speed : float [rad/s]
-        About: blocks of two revolutions do not tell it to a hundredth.
-    teeth : int
-        1 for an air cut.
+    `columns`: channels of the displacements
+    `spindle_speed` [rad/s]: about: blocks of two revolutions do not tell it to a hundredth
+    `teeth`: 1 for an air cut
     """
     n = recording.samples.shape[0]
     length = _block_length(recording.rate, spindle_speed)

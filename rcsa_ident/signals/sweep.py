@@ -134,25 +134,12 @@ def measure_pass(
     The spindle's angle is followed through the pass by the orders that are none of the teeth's: roundness and run-out of the flange turn
     with it, whatever the structure does. All windows share one unknown angle, or none with a trigger of known tooth angle.
 
-    Parameters
-    ----------
-    cut_id, tooling : str
-    cut : Recording
-        With displacement channels for X and/or Y.
-    air : Recording or None
-        The same speeds without cutting.
-    cutter : Cutter
-    conditions : CuttingConditions
-        As programmed, with the first speed; the feed per tooth is kept.
-    last_speed : float [rad/s]
-    coefficients : CuttingCoefficients
-    max_frequency : float [Hz]
-        Highest line.
-
-    Raises
-    ------
-    InputError
-        If there is no displacement channel, or the air cut lacks one.
+    `cut`: with displacement channels for X and/or Y
+    `air`: the same speeds without cutting
+    `conditions`: as programmed, with the first speed; the feed per tooth is kept
+    `last_speed` [rad/s]
+    `max_frequency` [Hz]: highest line
+    Raises `InputError` if there is no displacement channel, or the air cut lacks one.
     """
     axes = _moved_axes(cut)
     if air is not None and _moved_axes(air) != axes:
@@ -243,18 +230,9 @@ def measure_pass(
 def judge_pass_air(cut_id: str, tooling: str, air: Recording, speeds: tuple[float, float], max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on the air cut of a pass alone.
 
-    Parameters
-    ----------
-    air : Recording
-    speeds : (float, float) [rad/s]
-        At which the pass begins and ends.
-    max_frequency : float [Hz]
-        Highest line.
-
-    Raises
-    ------
-    InputError
-        If there is no displacement channel.
+    `speeds`: (float, float) [rad/s]; at which the pass begins and ends
+    `max_frequency` [Hz]: highest line
+    Raises `InputError` if there is no displacement channel.
     """
     axes, programmed, looked_at = _moved_axes(air), 0.5 * sum(speeds), examined(air)
     faults = looked_at.reasons + _length_faults(air, speeds)

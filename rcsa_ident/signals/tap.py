@@ -52,15 +52,10 @@ _ESTIMATE: dict[HitEstimator, Callable[[ComplexArray, ComplexArray], ComplexArra
 class Hit:
     """A hit of the hammer.
 
-    Parameters
-    ----------
-    record : int
-        Which recording it is in, from 0.
-    time : float [s]
-        Of its largest force.
-    force : float [N]
-    reason : str
-        Why it is left out; empty where it is used.
+    `record`: which recording it is in, from 0
+    `time` [s]: of its largest force
+    `force` [N]
+    `reason`: why it is left out; empty where it is used
     """
 
     record: int
@@ -129,21 +124,12 @@ def tap(
 ) -> TapFrf:
     """Return the receptance of a structure that was hit by a hammer.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    records : sequence of (force, response), shape (n,) each [N], [m, m/s or m/s^2]
-        Each with one hit or several.
-    derivative : int
-        How many times the response is differentiated: 0 displacement, 1 velocity, 2 acceleration.
-    estimator : HitEstimator
-    sensor_mass : float [kg]
-        Mass of the sensor, which the structure does not have without it; 0 where hammer and sensor are at two points, or it is light.
-
-    Raises
-    ------
-    InputError
-        There is no hit that can be used; the message says why of each.
+    `rate` [Hz]
+    `records`: sequence of (force, response), shape (n,) each [N], [m, m/s or m/s^2]; each with one hit or several
+    `derivative`: how many times the response is differentiated: 0 displacement, 1 velocity, 2 acceleration
+    `sensor_mass` [kg]: mass of the sensor, which the structure does not have without it; 0 where hammer and sensor are at two points, or it
+        is light
+    Raises `InputError`: there is no hit that can be used; the message says why of each.
 
     Examples
     --------

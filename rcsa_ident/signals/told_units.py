@@ -100,15 +100,7 @@ _QUANTITIES = {
 
 
 class Unit(NamedTuple):
-    """A unit.
-
-    Parameters
-    ----------
-    factor : float
-        SI units (with hertz and radians) that it is.
-    powers : tuple of int, length 6
-        Of kg, m, s, V, rad, cycle.
-    """
+    """A unit. `factor`: SI units (with hertz and radians) that it is. `powers`: tuple of int, length 6; of kg, m, s, V, rad, cycle."""
 
     factor: float
     powers: Powers
@@ -124,14 +116,9 @@ class Unit(NamedTuple):
 class FrfUnit(NamedTuple):
     """A unit of a motion over a force, or of a force over a motion.
 
-    Parameters
-    ----------
-    factor : float
-        SI units that it is.
-    order : int
-        How many times the motion is differentiated: 0 receptance, 1 mobility, 2 accelerance.
-    inverse : bool
-        Force over motion: dynamic stiffness, impedance, apparent mass.
+    `factor`: SI units that it is
+    `order`: how many times the motion is differentiated: 0 receptance, 1 mobility, 2 accelerance
+    `inverse`: force over motion: dynamic stiffness, impedance, apparent mass
     """
 
     factor: float
@@ -148,10 +135,7 @@ def is_untold(text: str) -> bool:
 def told_unit(text: str) -> Unit | None:
     """Return the unit that a text says, None where it says none that is known.
 
-    Parameters
-    ----------
-    text : str
-        Symbols with powers, multiplied by ``*``, ``·`` or a blank and divided by ``/``; a product behind a quotient needs parentheses.
+    `text`: symbols with powers, multiplied by ``*``, ``·`` or a blank and divided by ``/``; a product behind a quotient needs parentheses
 
     Examples
     --------

@@ -68,12 +68,8 @@ class RecordCode(RemarkCode):
 def assumed(what: str, unit: str, meant: str) -> Remark:
     """Return the remark on a unit that a file does not state, or states as one that does not say what is measured.
 
-    Parameters
-    ----------
-    what, unit : str
-        A channel, a column or a file, and its unit, empty where the file states none.
-    meant : str
-        The quantity with its unit that is assumed.
+    `what`, `unit`: a channel, a column or a file, and its unit, empty where the file states none
+    `meant`: the quantity with its unit that is assumed
 
     Examples
     --------
@@ -88,12 +84,8 @@ def assumed(what: str, unit: str, meant: str) -> Remark:
 class Verdict(Shown):
     """What was found in a record.
 
-    Parameters
-    ----------
-    reasons : tuple of Remark
-        Why the record is left out; empty where it is used.
-    notes : tuple of Remark
-        What the user should know though it is used.
+    `reasons`: why the record is left out; empty where it is used
+    `notes`: what the user should know though it is used
     """
 
     reasons: tuple[Remark, ...] = ()
@@ -145,16 +137,10 @@ def raw_faults(recording: Recording) -> tuple[Remark, ...]:
 def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float, deviation: FloatArray | None = None) -> tuple[Remark, ...]:
     """Return what is wrong with the speed: far from the programmed one, or drifting within the record and not followed.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-        Displacements.
-    lines : LineSpectrum
-        Their lines, in its first channels; others may follow.
-    programmed : float [rad/s]
-        The spindle speed that was set.
-    deviation : array, shape (n,) [rad], optional
-        Of the spindle's angle from that at the lines' speed, as it was followed.
+    `samples`, shape (n, c): displacements
+    `lines`: their lines, in its first channels; others may follow
+    `programmed` [rad/s]: the spindle speed that was set
+    `deviation` [rad], shape (n,): of the spindle's angle from that at the lines' speed, as it was followed
     """
     speed, rate = lines.spindle_speed, lines.rate
     order = np.arange(1, lines.amplitude.shape[0])[:, None]
@@ -194,10 +180,7 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float, de
 def smeared(wander: float | None) -> Remark | None:
     """Return a remark if the speed changes so much within a record that its lines are those of no one speed, else None.
 
-    Parameters
-    ----------
-    wander : float or None
-        Standard deviation of the speed as a share; None where it does not change.
+    `wander`: standard deviation of the speed as a share; None where it does not change
     """
     if wander is None or wander <= MOST_WANDER:
         return None
@@ -216,10 +199,7 @@ def _explained(lines: LineSpectrum, channels: int) -> float:
 def silence(power: FloatArray, variance: FloatArray) -> Remark | None:
     """Return a remark if no cutting force shows in the tooth-passing lines, else None.
 
-    Parameters
-    ----------
-    power, variance : arrays, shape (n, axes) [m^2]
-        Squared amplitudes, and variance of their real part.
+    `power`, `variance` [m^2], shape (n, axes): squared amplitudes, and variance of their real part
     """
     ratio = power / np.maximum(2.0 * variance, 1e-300)
     # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
@@ -239,20 +219,12 @@ def chatter(
 ) -> Remark | None:
     """Return a remark if a vibration off the spindle's orders stands out, else None.
 
-    Parameters
-    ----------
-    lines : LineSpectrum
-    channels : list of int
-        The displacements among its channels.
-    forced : array, one entry per displacement [m]
-        Largest tooth-passing amplitude.
-    band : (float, float) [Hz]
-        Frequencies between which chatter is looked for.
-    air : LineSpectrum, optional
-        Of the air cut: what is there, too, is no chatter.
-    absolute : callable, optional
-        Of frequencies [rad/s], what of each channel is in the absolute motion along each displacement, shape (n, channels, c): a spindle
-        that swings with its housing moves no displacement sensor that stands on it.
+    `channels`: the displacements among its channels
+    `forced`: array, one entry per displacement [m]; largest tooth-passing amplitude
+    `band`: (float, float) [Hz]; frequencies between which chatter is looked for
+    `air`: of the air cut: what is there, too, is no chatter
+    `absolute`: of frequencies [rad/s], what of each channel is in the absolute motion along each displacement, shape (n, channels, c): a
+        spindle that swings with its housing moves no displacement sensor that stands on it
     """
     n, step = lines.rest.shape[0], to_hz(lines.spindle_speed)
     amplitude = _spectrum(lines, channels, absolute)
@@ -314,12 +286,8 @@ def _stands_out(own: FloatArray, rest: FloatArray, claimed: FloatArray) -> bool:
 def tooth_count_fault(power: FloatArray, teeth: int) -> Remark | None:
     """Return a remark if the cut's own lines do not stand where `teeth` teeth would put them, else None.
 
-    Parameters
-    ----------
-    power : array, shape (m + 1,)
-        Squared amplitude of cut less air cut at each spindle order, all channels together.
-    teeth : int
-        Number of teeth that the cutter is said to have.
+    `power`, shape (m + 1,): squared amplitude of cut less air cut at each spindle order, all channels together
+    `teeth`: number of teeth that the cutter is said to have
     """
     order = np.arange(power.size)
     shared = (order % teeth == 0) & (order > 0)

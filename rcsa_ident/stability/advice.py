@@ -28,25 +28,16 @@ _DEPTHS = 49
 class UsableDepths(Shown):
     """How deep one may cut at each speed, and what stands against more.
 
-    Parameters
-    ----------
-    spindle_speed : array, shape (n,) [rad/s]
-        Rising.
-    limit : array, shape (n,) [m]
-        The stability limit, up to the largest depth.
-    stable : array, shape (n,) [m]
-        The recommended depth by stability alone: the limit less what is held back of it; infinite beyond `deepest`, NaN where the limits
-        are no source of one.
-    by_power, by_torque : array, shape (n,) [m]
-        By what the spindle has; infinite beyond `deepest`.
-    depth : array, shape (n,) [m]
-        The smallest of them; 0 beyond the spindle's highest speed, infinite where nothing limits the cut up to `deepest`, NaN where none
-        is recommended.
-    bound : tuple of Bound, length n
-    removal_rate : array, shape (n,) [m^3/s], or None
-        At that depth; None without a feed.
-    deepest : float [m]
-        The largest depth less the reserve: limits were looked for no further, so no depth beyond it can be recommended.
+    `spindle_speed` [rad/s], shape (n,): rising
+    `limit` [m], shape (n,): the stability limit, up to the largest depth
+    `stable` [m], shape (n,): the recommended depth by stability alone: the limit less what is held back of it; infinite beyond `deepest`,
+        NaN where the limits are no source of one
+    `by_power`, `by_torque` [m], shape (n,): by what the spindle has; infinite beyond `deepest`
+    `depth` [m], shape (n,): the smallest of them; 0 beyond the spindle's highest speed, infinite where nothing limits the cut up to
+        `deepest`, NaN where none is recommended
+    `bound`: tuple of Bound, length n
+    `removal_rate` [m^3/s], shape (n,): at that depth; None without a feed
+    `deepest` [m]: the largest depth less the reserve: limits were looked for no further, so no depth beyond it can be recommended
     """
 
     spindle_speed: FloatArray
@@ -70,13 +61,7 @@ class UsableDepths(Shown):
 
     @property
     def removal(self) -> FloatArray:
-        """The removal rate, shape (n,) [m^3/s].
-
-        Raises
-        ------
-        InputError
-            Without a feed per tooth it is not known.
-        """
+        """The removal rate, shape (n,) [m^3/s]. Raises `InputError`: without a feed per tooth it is not known."""
         if self.removal_rate is None:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: the removal rate grows with it")
         return self.removal_rate
@@ -108,15 +93,9 @@ def usable_depths(
 ) -> UsableDepths:
     """Return how deep one may cut at each speed.
 
-    Parameters
-    ----------
-    lobes : StabilityLobes
-        Speeds rise.
-    process : MillingProcess
-        Power, torque and removal rate grow with its feed per tooth; a drive whose power and torque have no limit does without.
-    drive : SpindleDrive
-    tolerance, probability, reserve : float
-        What is held back: see `StabilityLobes.recommended_depth`.
+    `lobes`: speeds rise
+    `process`: power, torque and removal rate grow with its feed per tooth; a drive whose power and torque have no limit does without
+    `tolerance`, `probability`, `reserve`: what is held back: see `StabilityLobes.recommended_depth`
     """
     speed = lobes.spindle_speed
     stable = lobes.recommended_depth(tolerance, probability, reserve)
@@ -145,12 +124,8 @@ def usable_depths(
 class _Taken(NamedTuple):
     """What a cut takes from the spindle over its depth.
 
-    Parameters
-    ----------
-    depth : array, shape (n,) [m]
-        Rising from 0; straight lines in between.
-    torque : array, shape (n,) [N m]
-    volume : array, shape (n,) [m^3/rad]
+    `depth` [m], shape (n,): rising from 0; straight lines in between
+    `torque` [N m], shape (n,); `volume` [m^3/rad], shape (n,)
     """
 
     depth: FloatArray
@@ -214,10 +189,7 @@ class SpeedWindow(Shown):
 def speed_windows(usable: UsableDepths, depth: float) -> list[SpeedWindow]:
     """Return the ranges of speed in which a depth is allowed, the one with the most reserve first; ends by straight lines.
 
-    Raises
-    ------
-    InputError
-        Of a depth beyond `usable.deepest` nothing is known.
+    Raises `InputError`: of a depth beyond `usable.deepest` nothing is known.
     """
     depth = positive("depth", depth, "m")
     if depth > usable.deepest * (1.0 + 1e-12):

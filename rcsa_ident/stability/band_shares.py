@@ -44,14 +44,9 @@ _HELP = {
 class Leading(NamedTuple):
     """The one parameter that a limit depends on most.
 
-    Parameters
-    ----------
-    name : str
-        A field of `Alteration`, `IDENTIFIED` in front where records have told of it, or ``tangential`` or ``radial_ratio``.
-    share : float
-        Of the variance of the limit's logarithm that its exact knowledge would take away.
-    words : str
-        What it is, and how well it is known.
+    `name`: a field of `Alteration`, `IDENTIFIED` in front where records have told of it, or ``tangential`` or ``radial_ratio``
+    `share`: of the variance of the limit's logarithm that its exact knowledge would take away
+    `words`: what it is, and how well it is known
     """
 
     name: str
@@ -63,16 +58,10 @@ class Leading(NamedTuple):
 class BandShares(Shown):
     """What the band of a cut's limit consists of.
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-        Within the tolerance of the recommended speed: where the limit is lowest.
-    deviation : float [-]
-        Standard deviation of the logarithm of the limit.
-    shares : mapping of Doubted to float
-        Of its square; their sum is 1.
-    leading : Leading or None
-        The parameter of drawing or coefficients that holds more of it than any other; None where there is none.
+    `spindle_speed` [rad/s]: within the tolerance of the recommended speed: where the limit is lowest
+    `deviation` [-]: standard deviation of the logarithm of the limit
+    `shares`: of its square; their sum is 1
+    `leading`: the parameter of drawing or coefficients that holds more of it than any other; None where there is none
     """
 
     spindle_speed: float
@@ -186,13 +175,9 @@ def _told_by(moves: FloatArray, slopes: FloatArray) -> float:
 def shares_of(slopes: FloatArray, unknowns: Mapping[Doubted, FloatArray], speed: float) -> BandShares | None:
     """Return shares of a variance by projection: group after group takes the part of the slopes that its unknowns span.
 
-    Parameters
-    ----------
-    slopes : array, shape (p,)
-        Change of the limit's logarithm along independent directions, per standard deviation.
-    unknowns : mapping of Doubted to array, shape (k, p)
-        See `Variation`; the rest is the machine's.
-    speed : float [rad/s]
+    `slopes`, shape (p,): change of the limit's logarithm along independent directions, per standard deviation
+    `unknowns`: mapping of Doubted to array, shape (k, p); see `Variation`; the rest is the machine's
+    `speed` [rad/s]
     """
     whole = float(slopes @ slopes)
     if whole == 0.0:

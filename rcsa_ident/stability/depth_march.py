@@ -26,14 +26,10 @@ _CHANGE, _MOST = 0.05, 4
 class Marched(NamedTuple):
     """Limits of a cut by the zero-order method.
 
-    Parameters
-    ----------
-    limit, chatter : arrays, shape (m,) [m], [rad/s]
-        Infinite and not a number where there is none up to the ladder's end.
-    lobe : integer array, shape (m,)
-        -1 where there is none.
-    absolute, frequency : float [m], [rad/s]
-        The smallest depth of all speeds and where it vibrates, of teeth that are alike; infinite and not a number where there is none.
+    `limit`, `chatter`: arrays, shape (m,) [m], [rad/s]; infinite and not a number where there is none up to the ladder's end
+    `lobe`, shape (m,): -1 where there is none
+    `absolute`, `frequency`: float [m], [rad/s]; the smallest depth of all speeds and where it vibrates, of teeth that are alike; infinite
+        and not a number where there is none
     """
 
     limit: FloatArray
@@ -46,13 +42,9 @@ class Marched(NamedTuple):
 class DepthLadder(NamedTuple):
     """Depths of a cut, ascending, and what it does at each.
 
-    Parameters
-    ----------
-    depth : array, shape (d,) [m]
-    stiffness : array, shape (d, r, r) [N/m]
-        Mean over a turn, of 1 - e^{-i w tau}.
-    pitch, spread : arrays, shape (d, teeth) [rad]
-        Mean distance of each tooth to the one ahead of it, and its change from the tip to the depth.
+    `depth` [m], shape (d,)
+    `stiffness` [N/m], shape (d, r, r): mean over a turn, of 1 - e^{-i w tau}
+    `pitch`, `spread` [rad], shape (d, teeth): mean distance of each tooth to the one ahead of it, and its change from the tip to the depth
     """
 
     depth: FloatArray

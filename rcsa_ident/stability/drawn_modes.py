@@ -36,12 +36,7 @@ _METHOD = FullDiscretisation()
 class DrawnTips:
     """Tips that a machine may have, as modes, each with cutting coefficients of its own.
 
-    Parameters
-    ----------
-    modes : tuple of TipModes
-    processes : tuple of MillingProcess
-    error : float
-        Norm of what the modes leave of the receptances, as a share, the worst draw's.
+    `error`: norm of what the modes leave of the receptances, as a share, the worst draw's
     """
 
     modes: tuple[TipModes, ...]
@@ -51,15 +46,10 @@ class DrawnTips:
     def limits(self, known: MonodromyOperator, speeds: FloatArray, limit: FloatArray, guess: FloatArray, max_depth: float) -> FloatArray:
         """Return the stability limit of each draw by its own period map, shape (draws, n) [m], infinite beyond `max_depth`.
 
-        Parameters
-        ----------
-        known : MonodromyOperator
-            Of the tip that is the middle of the draws.
-        speeds, limit : arrays, shape (n,) [rad/s], [m]
-            Where limits are wanted, and those of `known`.
-        guess : array, shape (draws, n) [m]
-            Where each search begins.
-        max_depth : float [m]
+        `known`: of the tip that is the middle of the draws
+        `speeds`, `limit`: arrays, shape (n,) [rad/s], [m]; where limits are wanted, and those of `known`
+        `guess` [m], shape (draws, n): where each search begins
+        `max_depth` [m]
         """
         deepest = known.process.within_reach(1.1 * max_depth)
         cuts = [_METHOD.monodromy(modes, process) for modes, process in zip(self.modes, self.processes, strict=True)]

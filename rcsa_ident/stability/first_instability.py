@@ -23,19 +23,11 @@ def first_loss(
     The growth is looked at on a ladder of depths; between three of them it may rise above zero and fall again, as it does where
     a lens of period doubling lies below the other lobes: a peak that comes near zero is climbed.
 
-    Parameters
-    ----------
-    growth : callable
-        Of a depth.
-    low : float
-        Where it is surely negative; lowered if it is not.
-    high : float
-    tolerance : float
-        Of the depth, relative.
-    ratio : float
-        Between steps of the ladder.
-    careful_from : float
-        Depth beyond which its steps are small whatever the growth: islands may stand there.
+    `growth`: of a depth
+    `low`: where it is surely negative; lowered if it is not
+    `tolerance`: of the depth, relative
+    `ratio`: between steps of the ladder
+    `careful_from`: depth beyond which its steps are small whatever the growth: islands may stand there
     """
     seen: dict[float, float] = {}
 

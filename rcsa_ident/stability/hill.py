@@ -76,12 +76,8 @@ class TipMotion:
 class Harmonics:
     """The harmonics of a cut's stiffness per depth, by delay, and of what it rubs with: n of them about zero.
 
-    Parameters
-    ----------
-    delay : array, shape (d,) [rad]
-    stiffness : complex array, shape (d, n, r, r) [N/m^2]
-    rubbing : complex array, shape (n, r, r), or None [N/m^2]
-        Per velocity, times the spindle's speed.
+    `delay` [rad], shape (d,); `stiffness` [N/m^2], shape (d, n, r, r)
+    `rubbing` [N/m^2], shape (n, r, r): per velocity, times the spindle's speed
     """
 
     delay: FloatArray
@@ -92,12 +88,8 @@ class Harmonics:
 class PeriodicTeeth:
     """A cut's stiffness as harmonics of the frequency with which it repeats itself: tooth passing, or the spindle's with unlike teeth.
 
-    Parameters
-    ----------
-    process : MillingProcess
-    harmonics : int or None
-        That are kept; None keeps all.
-    directions : 2, 3 or 5
+    `harmonics`: that are kept; None keeps all
+    `directions`: 2, 3 or 5
     """
 
     def __init__(self, process: MillingProcess, harmonics: int | None, directions: Directions) -> None:
@@ -147,14 +139,9 @@ class PeriodicTeeth:
 def fewer_delays(delay: FloatArray, stiffness: ComplexArray, highest: float) -> tuple[FloatArray, ComplexArray]:
     """Return fewer delays that act as many do: between them e^{-i w tau} is a polynomial through Chebyshev's nodes.
 
-    Parameters
-    ----------
-    delay : array, shape (d,) [rad]
-        Ascending.
-    stiffness : complex array, shape (d, ...)
-        What acts with each.
-    highest : float [-]
-        Largest frequency over the spindle's.
+    `delay` [rad], shape (d,): ascending
+    `stiffness`, shape (d, ...): what acts with each
+    `highest` [-]: largest frequency over the spindle's
     """
     delays, acting = [], []
     for places in np.split(np.arange(delay.size), np.flatnonzero(highest * np.diff(delay) > _APART) + 1):

@@ -54,17 +54,9 @@ LONGEST_LIMIT = 3600.0
 def method_named(name: str, field: str = "method") -> StabilityMethod:
     """Return a method with its default settings.
 
-    Parameters
-    ----------
-    name : str
-        One of `MethodName`.
-    field : str
-        What the user calls the name, for the error.
-
-    Raises
-    ------
-    InputError
-        If there is no such method.
+    `name`: one of `MethodName`
+    `field`: what the user calls the name, for the error
+    Raises `InputError` if there is no such method.
     """
     if name not in METHODS:
         raise InputError(field, name, f"one of {', '.join(METHODS)}")
@@ -366,12 +358,8 @@ def in_proportion(drawn: FloatArray, nominal: FloatArray, wanted: FloatArray) ->
 def uncoupled_planes(x: Receptance | None, y: Receptance | None) -> Receptance:
     """Return the tip's 2 x 2 receptance of a machine whose bending planes do not feel each other.
 
-    Parameters
-    ----------
-    x : Receptance or None
-        With ``tip.x``, as coupling gives it for the X plane; None is a rigid direction.
-    y : Receptance or None
-        With ``tip.y``, at the same frequencies.
+    `x`: with ``tip.x``, as coupling gives it for the X plane; None is a rigid direction
+    `y`: with ``tip.y``, at the same frequencies
     """
     known = [h.block((c,)) for h, c in ((x, TIP[0]), (y, TIP[1])) if h is not None]
     if not known:

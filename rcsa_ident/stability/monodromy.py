@@ -36,19 +36,13 @@ SLICES = 6000.0
 class Multiplier:
     """By what the most persistent vibration is multiplied per period.
 
-    Parameters
-    ----------
-    value : complex
-        Of a pair the one above the real axis.
-    period : float [s]
-    vector : complex array
-        State and motion that belong to it; a good start for the next search.
-    omega : array, shape (k,) [rad/s]
-        Frequencies of that vibration, as they stand beside each other: arg(value) / period and multiples of 2 pi / period away.
-    motion : array, shape (k,) [m]
-        The tip's amplitude at each, to one common factor.
-    residual : float
-        Of the eigenvalue, as a share of it.
+    `value`: of a pair the one above the real axis
+    `period` [s]
+    `vector`: state and motion that belong to it; a good start for the next search
+    `omega` [rad/s], shape (k,): frequencies of that vibration, as they stand beside each other: arg(value) / period and multiples of 2 pi /
+        period away
+    `motion` [m], shape (k,): the tip's amplitude at each, to one common factor
+    `residual`: of the eigenvalue, as a share of it
     """
 
     value: complex
@@ -62,13 +56,10 @@ class Multiplier:
 class Windows(NamedTuple):
     """Which teeth stand where, as the kernels want it.
 
-    Parameters
-    ----------
-    rows : array, shape (w, 7)
-        See `_cut_kernels`.
-    forms, rubbing : arrays, shape (w, 5, r, r)
-        What each pushes and rubs with in the displacements that are kept; rubbing has none where nothing rubs.
-    delays : array, shape (d,) [rad]
+    `rows`, shape (w, 7): see `_cut_kernels`
+    `forms`, `rubbing`, shape (w, 5, r, r): what each pushes and rubs with in the displacements that are kept; rubbing has none where
+        nothing rubs
+    `delays` [rad], shape (d,)
     """
 
     rows: FloatArray
@@ -80,14 +71,8 @@ class Windows(NamedTuple):
 class MonodromyOperator:
     """A cut that waits for its speed and depth.
 
-    Parameters
-    ----------
-    modes : TipModes
-    process : MillingProcess
-    degree : int
-        Of the polynomials for the force within a step.
-    frozen : bool
-        Constant coefficients within a step, and what was there a delay ago on a straight line.
+    `degree`: of the polynomials for the force within a step
+    `frozen`: constant coefficients within a step, and what was there a delay ago on a straight line
     """
 
     def __init__(self, modes: TipModes, process: MillingProcess, degree: int, frozen: bool = False) -> None:
@@ -141,18 +126,11 @@ class MonodromyOperator:
     ) -> Multiplier:
         """Return the multiplier of largest magnitude.
 
-        Parameters
-        ----------
-        speed : float [rad/s]
-        depth : float [m]
-        step : float [s]
-            Longest step.
-        start : complex array or None
-            Vector of a similar cut.
-        waves : bool
-            Also look at the frequencies of the vibration.
-        residual : float
-            Of the eigenvalue, as a share of it, at which the search for it ends.
+        `speed` [rad/s]; `depth` [m]
+        `step` [s]: longest step
+        `start`: vector of a similar cut
+        `waves`: also look at the frequencies of the vibration
+        `residual`: of the eigenvalue, as a share of it, at which the search for it ends
         """
         layout = self._laid_out(speed, depth, step)
         if layout.time.size == 0:
@@ -174,17 +152,10 @@ class MonodromyOperator:
         It begins as noise on the surface. With small multipliers it dies away in the end, and may have grown a million times by then
         [trefethen2005].
 
-        Parameters
-        ----------
-        speed : float [rad/s]
-        depth : float [m]
-        step : float [s]
-            Longest step.
-        periods : int
-        most : float
-            Growth beyond which nobody asks how much it is.
-        seed : int
-            Of the noise.
+        `speed` [rad/s]; `depth` [m]
+        `step` [s]: longest step
+        `most`: growth beyond which nobody asks how much it is
+        `seed`: of the noise
         """
         layout = self._laid_out(speed, depth, step)
         if layout.time.size == 0:

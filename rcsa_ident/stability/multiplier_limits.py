@@ -86,15 +86,10 @@ def longest_step(cut: MonodromyOperator) -> float:
 def visits(process: MillingProcess, speeds: FloatArray, top: float, max_depth: float, degree: int, frozen: bool) -> FloatArray:
     """Return about how often a mode is moved on to the next point until the limits of a fitted tip are known, shape (n,).
 
-    Parameters
-    ----------
-    process : MillingProcess
-    speeds : array, shape (n,) [rad/s]
-    top : float [rad/s]
-        Where the tip's receptance ends.
-    max_depth : float [m]
-    degree, frozen
-        As of `MonodromyOperator`.
+    `speeds` [rad/s], shape (n,)
+    `top` [rad/s]: where the tip's receptance ends
+    `max_depth` [m]
+    `degree`, `frozen`: as of `MonodromyOperator`
     """
     cutter, engagement = process.cutter, process.widest
     uneven = bool(np.ptp(cutter.pitch) > 1e-9 or np.ptp(cutter.runout) > 0.0)

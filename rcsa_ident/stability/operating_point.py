@@ -30,18 +30,12 @@ class Bound(StrEnum):
 class HeldBack(Shown):
     """How a recommended depth follows from the stability limit, step by step.
 
-    Parameters
-    ----------
-    limit : float [m]
-        At the speed itself.
-    within_tolerance : float [m]
-        The lowest limit within the tolerance of the speed.
-    with_probability : float or None [m]
-        Up to which so large a share of the possible machines is stable within that tolerance; None where none were drawn.
-    depth : float [m]
-        Less the reserve.
-    tolerance, probability, reserve : float
-        Shares.
+    `limit` [m]: at the speed itself
+    `within_tolerance` [m]: the lowest limit within the tolerance of the speed
+    `with_probability` [m]: up to which so large a share of the possible machines is stable within that tolerance; None where none were
+        drawn
+    `depth` [m]: less the reserve
+    `tolerance`, `probability`, `reserve`: shares
     """
 
     limit: float

@@ -26,17 +26,9 @@ AROUND, FINE = 0.015, 0.005
 def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[float, float]]:
     """Return the speeds at which a level is highest, one for each pocket, the best first.
 
-    Parameters
-    ----------
-    speed, level : array, shape (n,)
-        In any order; an infinite level is one, too.
-    count : int
-        At most so many.
-
-    Returns
-    -------
-    list of (float, float)
-        Speed and level of the peaks; the middle of a plateau.
+    `speed`, `level`, shape (n,): in any order; an infinite level is one, too
+    `count`: at most so many
+    Returns list of (float, float): speed and level of the peaks; the middle of a plateau.
     """
     order = np.argsort(speed)
     speed, limit = np.asarray(speed)[order], np.asarray(level)[order]
@@ -60,12 +52,8 @@ def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[fl
 class Neighbourhood:
     """Close speeds around a pocket's top.
 
-    Parameters
-    ----------
-    tops : (float, float)
-        Between which the top may move.
-    speeds : array, shape (n,)
-        Rising, as far beyond as a tolerance needs.
+    `tops`: (float, float); between which the top may move
+    `speeds`, shape (n,): rising, as far beyond as a tolerance needs
     """
 
     tops: tuple[float, float]
@@ -75,14 +63,9 @@ class Neighbourhood:
 def speeds_around(tops: Sequence[float], tolerance: float, between: tuple[float, float]) -> list[Neighbourhood]:
     """Return the neighbourhood of each of some pockets' tops: `AROUND` on both sides of it.
 
-    Parameters
-    ----------
-    tops : sequence of float
-        One nearer to an earlier one than `AROUND` belongs to that.
-    tolerance : float
-        As in `least_within_tolerance`.
-    between : (float, float)
-        Tops do not move beyond.
+    `tops`: one nearer to an earlier one than `AROUND` belongs to that
+    `tolerance`: as in `least_within_tolerance`
+    `between`: (float, float); tops do not move beyond
     """
     step = max(FINE, tolerance / 8.0)
     found: list[Neighbourhood] = []
@@ -101,14 +84,9 @@ def speeds_around(tops: Sequence[float], tolerance: float, between: tuple[float,
 def least_within_tolerance(speed: FloatArray, limit: FloatArray, tolerance: float) -> FloatArray:
     """Return the smallest limit within a share of each speed on both sides, shape (n,).
 
-    Parameters
-    ----------
-    speed : array, shape (n,)
-        Rising; nothing is known beyond its ends.
-    limit : array, shape (n,)
-        Finite; straight lines in between.
-    tolerance : float
-        As 0.02 for 2 %.
+    `speed`, shape (n,): rising; nothing is known beyond its ends
+    `limit`, shape (n,): finite; straight lines in between
+    `tolerance`: as 0.02 for 2 %
     """
     if not 0.0 <= tolerance < 0.5:
         raise InputError("tolerance", tolerance, "a share from 0 to below 0.5")

@@ -21,13 +21,8 @@ SLOWEST = 0.1
 class Regeneration:
     """F = sum over rows of stiffness (q(t) - q(t - delay)) + rubbing / speed q'(t), in r directions of the machine.
 
-    Parameters
-    ----------
-    rows : Rows
-    stiffness : array, shape (rows, 5, r, r) [N/m, with slopes N and N m]
-        Of 1, cos, sin, cos 2 and sin 2 of the immersion.
-    rubbing : array, shape (rows, 5, r, r), or None [N/m]
-        Process damping times the spindle's speed.
+    `stiffness` [N/m, with slopes N and N m], shape (rows, 5, r, r): of 1, cos, sin, cos 2 and sin 2 of the immersion
+    `rubbing` [N/m], shape (rows, 5, r, r): process damping times the spindle's speed
     """
 
     rows: Rows
@@ -54,13 +49,9 @@ class Regeneration:
 def regeneration(process: MillingProcess, depth: float, directions: Directions = 2) -> Regeneration:
     """Return what a cut of a depth pushes with.
 
-    Parameters
-    ----------
-    process : MillingProcess
-        Its engagement; one that changes by a profile of its own is left aside.
-    depth : float [m]
-    directions : 2, 3 or 5
-        x and y of the machine, with z, with the slopes x' and y'.
+    `process`: its engagement; one that changes by a profile of its own is left aside
+    `depth` [m]
+    `directions`: 2, 3 or 5; x and y of the machine, with z, with the slopes x' and y'
     """
     rows = rows_of(process.cutter, process.engagement, depth, process.feed_per_tooth, along=directions == 5)
     return regeneration_of(process, rows, directions)
@@ -97,12 +88,9 @@ def turned(process: MillingProcess, directions: Directions) -> FloatArray:
 def sliced(rows: Rows, parts: FloatArray) -> Rows:
     """Return rows of a plain cut's edge cut into parts: from the tip up, by shares of the depth, each with angles of its own.
 
-    Parameters
-    ----------
-    rows : Rows
-        Each the whole edge of a tooth.
-    parts : array, shape (k, 2) or (k, 4)
-        Shares of the depth between which a part lies, and the angles between which it cuts; without these those of the row.
+    `rows`: each the whole edge of a tooth
+    `parts`: array, shape (k, 2) or (k, 4); shares of the depth between which a part lies, and the angles between which it cuts; without
+        these those of the row
     """
     whole = np.repeat(np.arange(rows.count), len(parts))
     each = np.tile(parts, (rows.count, 1))

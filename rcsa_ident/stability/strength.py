@@ -30,13 +30,8 @@ _PASSES = f"the margin is that to a vibration which grows a thousandfold within 
 class Strength(NamedTuple):
     """What a cut would bear.
 
-    Parameters
-    ----------
-    times : float
-        How many times its K_tc may be what it is; below 1 it chatters.
-    chatter_frequency : float [rad/s]
-        At that strength; not a number where even the largest is stable.
-    warnings : tuple of str
+    `times`: how many times its K_tc may be what it is; below 1 it chatters
+    `chatter_frequency` [rad/s]: at that strength; not a number where even the largest is stable
     """
 
     times: float
@@ -47,14 +42,9 @@ class Strength(NamedTuple):
 class Search(NamedTuple):
     """Where a strength is looked for.
 
-    Parameters
-    ----------
-    most : float
-        Nobody asks for more, nor for less than one over it.
-    tolerance : float
-        Of the answer, as a share.
-    near : float
-        What a similar cut bears; not a number where none is known.
+    `most`: nobody asks for more, nor for less than one over it
+    `tolerance`: of the answer, as a share
+    `near`: what a similar cut bears; not a number where none is known
     """
 
     most: float
@@ -72,15 +62,8 @@ def strength(
 ) -> Strength:
     """Return how many times stronger the material may be.
 
-    Parameters
-    ----------
-    method : StabilityMethod
-    tip : Receptance or TipModes
-        As the method wants it.
-    process : MillingProcess
-    speed : float [rad/s]
-    depth : float [m]
-    search : Search
+    `tip`: as the method wants it
+    `speed` [rad/s]; `depth` [m]
     """
     if isinstance(method, ZeroOrder):
         times, chatter = method.strength(tip, process, speed, depth, search.most)

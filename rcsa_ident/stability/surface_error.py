@@ -166,14 +166,8 @@ def forced_vibration(tip: Receptance | TipModes, process: MillingProcess, speed:
 
     By the force lines of a rigid tool; instants are evenly apart, tooth 1 at immersion 0 at the first one.
 
-    Parameters
-    ----------
-    tip : Receptance or TipModes
-    process : MillingProcess
-        With a feed per tooth.
-    speed : float [rad/s]
-    depth : float [m]
-    instants : int
+    `process`: with a feed per tooth
+    `speed` [rad/s]; `depth` [m]
     """
     response = _Tip(_from_dc(tip) if isinstance(tip, TipModes) else tip)
     orders = np.arange(min(int(response.omega[-1] / speed), MOST_ORDERS, instants // 2 - 1) + 1)

@@ -55,13 +55,9 @@ _RATIO = 1.2
 class MillingHistory:
     """A simulated cut.
 
-    Parameters
-    ----------
-    time : array, shape (n,) [s]
-    angle : array, shape (n,) [rad]
-        Immersion of tooth 1 at the tip, growing.
-    tip, velocity, force : arrays, shape (n, 2) [m], [m/s], [N]
-        Machine axes.
+    `time` [s], shape (n,)
+    `angle` [rad], shape (n,): immersion of tooth 1 at the tip, growing
+    `tip`, `velocity`, `force`: arrays, shape (n, 2) [m], [m/s], [N]; machine axes
     """
 
     time: FloatArray
@@ -165,16 +161,9 @@ def milling_history(
 ) -> MillingHistory:
     """Simulate a cut that starts in the steady state of equal teeth.
 
-    Parameters
-    ----------
-    tip : TipModes
-    process : MillingProcess
-        With its feed per tooth.
-    speed : float [rad/s]
-    depth : float [m]
-    revolutions : float
-    push : float [m]
-        Off the steady state.
+    `process`: with its feed per tooth
+    `speed` [rad/s]; `depth` [m]
+    `push` [m]: off the steady state
     """
     if process.feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m] of the cut to simulate")

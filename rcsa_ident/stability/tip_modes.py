@@ -244,10 +244,7 @@ def _allowed(values: ComplexArray) -> FloatArray | None:
 def slope_length(values: ComplexArray) -> FloatArray:
     """Return a factor for each direction that makes slopes as large as translations: what a fit of them all is to weigh alike.
 
-    Parameters
-    ----------
-    values : complex array, shape (n, r, r)
-        In 2, 3 or 5 directions.
+    `values`, shape (n, r, r): in 2, 3 or 5 directions
     """
     r = values.shape[1]
     size = np.ones(r)

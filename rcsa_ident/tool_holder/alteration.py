@@ -12,20 +12,14 @@ from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
 class Alteration:
     """Differences from a drawing: lengths, and logarithms of ratios.
 
-    Parameters
-    ----------
-    stickout : float [m]
-        The tool stands further out of its holder; its insertion stays.
-    fluted_length : float [m]
-        Length of the fluted part, the tool's whole length staying.
-    fluted_diameter : float [-]
-        Equivalent diameter of the fluted part; a told area goes with its square and a told second moment with its fourth power.
-    youngs_modulus : float [-]
-        Of the tool.
-    translational_stiffness, rotational_stiffness, translational_damping, rotational_damping : float [-]
-        Of the contact between tool and holder.
-    holder_diameter : float [-]
-        Outer diameters of the holder.
+    `stickout` [m]: the tool stands further out of its holder; its insertion stays
+    `fluted_length` [m]: length of the fluted part, the tool's whole length staying
+    `fluted_diameter` [-]: equivalent diameter of the fluted part; a told area goes with its square and a told second moment with its fourth
+        power
+    `youngs_modulus` [-]: of the tool
+    `translational_stiffness`, `rotational_stiffness`, `translational_damping`, `rotational_damping` [-]: of the contact between tool and
+        holder
+    `holder_diameter` [-]: outer diameters of the holder
 
     Examples
     --------
@@ -58,13 +52,7 @@ def fluted_segments(tool: tuple[BeamSegment, ...]) -> int:
 
 
 def altered(assembly: ToolAssembly, by: Alteration) -> ToolAssembly:
-    """Return a tool-holder that differs from its drawing.
-
-    Raises
-    ------
-    InputError
-        If nothing would be left of a segment.
-    """
+    """Return a tool-holder that differs from its drawing. Raises `InputError` if nothing would be left of a segment."""
     flutes = fluted_segments(assembly.tool)
     tool = [_wider(segment, by.fluted_diameter) if i < flutes else segment for i, segment in enumerate(assembly.tool)]
     tool = [replace(s, material=replace(s.material, youngs_modulus=s.material.youngs_modulus * exp(by.youngs_modulus))) for s in tool]

@@ -40,16 +40,10 @@ _PARAMETERS = {
 class TypicalContact:
     """What the contact of tool and holder is worth before anybody has measured it.
 
-    Parameters
-    ----------
-    kind : str
-        How the chuck clamps, as ``collet``.
-    contact : Contact
-        Per metre of insertion.
-    stiffness_spread, damping_spread : float [-]
-        Standard deviations of the logarithms.
-    source : str
-        Where the values come from.
+    `kind`: how the chuck clamps, as ``collet``
+    `contact`: per metre of insertion
+    `stiffness_spread`, `damping_spread` [-]: standard deviations of the logarithms
+    `source`: where the values come from
     """
 
     kind: str
@@ -68,17 +62,10 @@ class TypicalContact:
 class CatalogueHolder(Shown):
     """A holder as its dimensions make it, without the taper behind the spindle's face.
 
-    Parameters
-    ----------
-    taper, chuck : str
-    segments : tuple of BeamSegment
-        From the nose to the spindle's face (HSK) or the gauge line (BT, CAT); of steel.
-    insertion : float [m]
-        How deep its bore clamps.
-    sources : tuple of str
-        Where the taper's dimensions and the chuck's come from, or that they are typical.
-    contact : TypicalContact or None
-        None where nothing is known of this kind of chuck; a tap test of the clamped tool tells it.
+    `segments`: from the nose to the spindle's face (HSK) or the gauge line (BT, CAT); of steel
+    `insertion` [m]: how deep its bore clamps
+    `sources`: where the taper's dimensions and the chuck's come from, or that they are typical
+    `contact`: None where nothing is known of this kind of chuck; a tap test of the clamped tool tells it
     """
 
     taper: str
@@ -132,21 +119,11 @@ def bores(chuck: str, taper: str | None = None) -> tuple[float, float]:
 def holder(taper: str, chuck: str, bore: float, length: float | None = None) -> CatalogueHolder:
     """Return a holder of the catalogue for a shank.
 
-    Parameters
-    ----------
-    taper : str
-        One of `tapers()`, as ``HSK-A63``.
-    chuck : str
-        One of `chucks()`, as ``ER32``.
-    bore : float [m]
-        Diameter of the tool's shank; the smallest size that takes it is chosen.
-    length : float or None [m]
-        From the nose to the spindle's face or the gauge line, which a drawing calls A; by default a typical one.
-
-    Raises
-    ------
-    InputError
-        Of a name that is not there, a shank that the chuck does not take, or a length that leaves no room for the chuck.
+    `taper`: one of `tapers()`, as ``HSK-A63``
+    `chuck`: one of `chucks()`, as ``ER32``
+    `bore` [m]: diameter of the tool's shank; the smallest size that takes it is chosen
+    `length` [m]: from the nose to the spindle's face or the gauge line, which a drawing calls A; by default a typical one
+    Raises `InputError` of a name that is not there, a shank that the chuck does not take, or a length that leaves no room for the chuck.
 
     Examples
     --------

@@ -21,15 +21,7 @@ _ANOTHER = float(np.sqrt(2.0))
 
 
 class Drawing(NamedTuple):
-    """A tooling as drawn, and how well that is known.
-
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    spread : Spread
-    tool_model, holder_model : str
-        Empty where nothing is shared.
-    """
+    """A tooling as drawn, and how well that is known. `tool_model`, `holder_model`: empty where nothing is shared."""
 
     assembly: ToolAssembly
     spread: Spread
@@ -40,14 +32,9 @@ class Drawing(NamedTuple):
 class RoughUnknown(NamedTuple):
     """One number that a drawing does not tell.
 
-    Parameters
-    ----------
-    field : str
-        Of `Alteration`.
-    owner : str
-        Name of the tooling, or of the model of tool or holder, that it belongs to.
-    kind : str
-        ``tooling``, ``tool`` or ``holder``: what the owner is.
+    `field`: of `Alteration`
+    `owner`: name of the tooling, or of the model of tool or holder, that it belongs to
+    `kind`: ``tooling``, ``tool`` or ``holder``: what the owner is
     """
 
     field: str
@@ -59,13 +46,9 @@ class RoughUnknown(NamedTuple):
 class RoughToolings:
     """Unknowns of several toolings.
 
-    Parameters
-    ----------
-    unknowns : tuple of RoughUnknown, length u
-    spread : array, shape (u,)
-        Standard deviations before any cut: of logarithms, or [m].
-    weights : array, shape (t, 9, u)
-        Which unknowns add up to each field of each tooling's alteration.
+    `unknowns`: tuple of RoughUnknown, length u
+    `spread`, shape (u,): standard deviations before any cut: of logarithms, or [m]
+    `weights`, shape (t, 9, u): which unknowns add up to each field of each tooling's alteration
     """
 
     unknowns: tuple[RoughUnknown, ...]
@@ -85,17 +68,11 @@ class RoughToolings:
 class KnownToolings:
     """What cuts, taps or rings have told of toolings.
 
-    Parameters
-    ----------
-    unknowns : tuple of RoughUnknown, length u
-    spread : array, shape (u,)
-        Standard deviations before.
-    mean : array, shape (u,)
-        What they are believed to be, in units of their spreads.
-    covariance : array, shape (u, u)
-        In the same units.
-    toolings : tuple of str
-        That have told it.
+    `unknowns`: tuple of RoughUnknown, length u
+    `spread`, shape (u,): standard deviations before
+    `mean`, shape (u,): what they are believed to be, in units of their spreads
+    `covariance`, shape (u, u): in the same units
+    `toolings`: that have told it
     """
 
     unknowns: tuple[RoughUnknown, ...]
@@ -121,18 +98,12 @@ class KnownToolings:
 class FittedDrawing:
     """A tooling as it is believed to be, and how it may differ.
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-        With the most probable values of what its drawing does not tell.
-    ends : tuple of (ToolAssembly, ToolAssembly), length k + n
-        One standard deviation ahead and behind along each unknown: first those of which something is known, then its own.
-    fields : tuple of str, length k + n
-        Of `Alteration`, that they belong to.
-    known : array of int, shape (k,)
-        Which of `KnownToolings` the first ones are.
-    deviation : array, shape (k,)
-        Their standard deviations in the units of `KnownToolings`.
+    `assembly`: with the most probable values of what its drawing does not tell
+    `ends`: tuple of (ToolAssembly, ToolAssembly), length k + n; one standard deviation ahead and behind along each unknown: first those of
+        which something is known, then its own
+    `fields`: tuple of str, length k + n; of `Alteration`, that they belong to
+    `known`: array of int, shape (k,); which of `KnownToolings` the first ones are
+    `deviation`, shape (k,): their standard deviations in the units of `KnownToolings`
     """
 
     assembly: ToolAssembly
@@ -148,12 +119,8 @@ def rough_toolings(drawings: Mapping[str, Drawing], known: KnownToolings | None 
     Tools of one model share fluted part and modulus, holders of one model their contact and diameter. A contact differs a little
     in each clamping beside what its model shares.
 
-    Parameters
-    ----------
-    drawings : mapping of tooling to Drawing
-        None of them told of `known`.
-    known : KnownToolings, optional
-        What others have told of the same models.
+    `drawings`: mapping of tooling to Drawing, None of them told of `known`
+    `known`: what others have told of the same models
     """
     sharing = [d.holder_model for d in drawings.values() if d.holder_model]
     told = set() if known is None else {unknown.owner for unknown in known.unknowns if unknown.kind == "holder"}
@@ -180,14 +147,7 @@ def rough_toolings(drawings: Mapping[str, Drawing], known: KnownToolings | None 
 
 
 def fitted(name: str, drawing: Drawing, known: KnownToolings | None = None) -> FittedDrawing:
-    """Return a tooling as it is believed to be: by what is known of it or of its models, else as drawn.
-
-    Parameters
-    ----------
-    name : str
-    drawing : Drawing
-    known : KnownToolings, optional
-    """
+    """Return a tooling as it is believed to be: by what is known of it or of its models, else as drawn."""
     if drawing.spread.exact:
         return FittedDrawing(drawing.assembly)
     told = {} if known is None else {unknown: k for k, unknown in enumerate(known.unknowns)}
@@ -228,11 +188,8 @@ def owners_of(name: str, drawing: Drawing) -> set[tuple[str, str]]:
 def _unknowns_of(name: str, drawing: Drawing, reclamped: float | None) -> dict[RoughUnknown, float]:
     """What is unknown of a tooling, with its spread.
 
-    Parameters
-    ----------
-    reclamped : float or None
-        Factor on the scatter of its own clamping, which comes on top of what its holder's model shares; None where nothing is shared,
-        and one unknown holds both.
+    `reclamped`: factor on the scatter of its own clamping, which comes on top of what its holder's model shares; None where nothing is
+        shared, and one unknown holds both
     """
     spread, assembly = drawing.spread, drawing.assembly
     tool = (drawing.tool_model, "tool") if drawing.tool_model else (name, "tooling")

@@ -27,15 +27,9 @@ class Motion(StrEnum):
 class FreeMode:
     """A mode of a free body.
 
-    Parameters
-    ----------
-    motion : Motion
-    order : int
-        From 1 in its kind; bending modes stand for both planes.
-    omega : float [rad/s]
-        Undamped natural frequency, the modulus of the pole.
-    damping : float or None [-]
-        Damping ratio; None where the model tells none, of axial and torsional modes.
+    `order`: from 1 in its kind; bending modes stand for both planes
+    `omega` [rad/s]: undamped natural frequency, the modulus of the pole
+    `damping` [-]: damping ratio; None where the model tells none, of axial and torsional modes
     """
 
     motion: Motion
@@ -50,15 +44,9 @@ class FreeMode:
 def bending_modes(body: ToolAssembly, count: int, highest: float, shear_coefficient: ShearCoefficient = cowper) -> tuple[FreeMode, ...]:
     """Return the first bending modes of a free tool-holder, in ascending order, fewer where fewer are below the highest frequency.
 
-    Parameters
-    ----------
-    body : ToolAssembly
-        With what hangs behind its flange, see `rcsa_ident.tool_holder.taper.hung`; of a tool alone see `bare`.
-    count : int
-    highest : float [Hz]
-        The mesh is chosen for it, and modes end there.
-    shear_coefficient : callable
-        As in `rcsa_ident.tool_holder.model.tool_holder_structure`.
+    `body`: with what hangs behind its flange, see `rcsa_ident.tool_holder.taper.hung`; of a tool alone see `bare`
+    `highest` [Hz]: the mesh is chosen for it, and modes end there
+    `shear_coefficient`: as in `rcsa_ident.tool_holder.model.tool_holder_structure`
 
     Examples
     --------
@@ -77,11 +65,8 @@ def bending_modes(body: ToolAssembly, count: int, highest: float, shear_coeffici
 def damped_poles(structure: Structure, highest: float) -> np.ndarray:
     """Return the poles of a free structure above its rigid-body motions, in ascending order [1/s].
 
-    Parameters
-    ----------
-    structure : Structure
-        Of one bending plane.
-    highest : float [Hz]
+    `structure`: of one bending plane
+    `highest` [Hz]
     """
     omega = 2.0 * np.pi * highest
     found = poles(structure, omega).pole
@@ -100,12 +85,8 @@ def bare(tool: Sequence[BeamSegment]) -> ToolAssembly:
 def rod_modes(body: ToolAssembly, motion: Motion, highest: float) -> tuple[FreeMode, ...]:
     """Return axial or torsional modes of a free body up to a frequency, from rods in a row; they tell lines apart, and nothing is learned.
 
-    Parameters
-    ----------
-    body : ToolAssembly
-    motion : Motion
-        Axial or torsion.
-    highest : float [Hz]
+    `motion`: axial or torsion
+    `highest` [Hz]
 
     Examples
     --------

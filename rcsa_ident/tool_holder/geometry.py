@@ -13,13 +13,8 @@ from rcsa_ident.base.shown import Shown
 class Material:
     """An isotropic elastic material.
 
-    Parameters
-    ----------
-    youngs_modulus : float [Pa]
-    density : float [kg/m^3]
-    poisson : float [-]
-    loss_factor : float [-]
-        Hysteretic damping: the modulus is E (1 + i loss_factor).
+    `youngs_modulus` [Pa]; `density` [kg/m^3]; `poisson` [-]
+    `loss_factor` [-]: hysteretic damping: the modulus is E (1 + i loss_factor)
     """
 
     youngs_modulus: float
@@ -158,16 +153,10 @@ class Contact:
 class ToolAssembly(Shown):
     """A tool clamped in a holder; all segments run from the tip's end to the flange.
 
-    Parameters
-    ----------
-    tool : tuple of BeamSegment
-        The tool's length in use: stickout + insertion (see `clamped`).
-    holder : tuple of BeamSegment
-        From the holder's nose to the flange face.
-    insertion : float [m]
-        Length of tool inside the holder's bore; 0 is a butt joint.
-    contact : Contact or None
-        None is a rigid connection over the insertion.
+    `tool`: the tool's length in use: stickout + insertion (see `clamped`)
+    `holder`: from the holder's nose to the flange face
+    `insertion` [m]: length of tool inside the holder's bore; 0 is a butt joint
+    `contact`: None is a rigid connection over the insertion
 
     Examples
     --------

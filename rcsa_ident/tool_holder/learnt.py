@@ -33,16 +33,10 @@ _ADDED = ("stickout", "fluted_length")
 class LearnedValue(NamedTuple):
     """One number of a drawing before and after the cuts.
 
-    Parameters
-    ----------
-    field : str
-        Of `Alteration`.
-    toolings : tuple of str
-        That share it.
-    drawn, spread : float
-        What the drawing says, and its standard deviation.
-    found, deviation : float
-        What is believed now, and its standard deviation.
+    `field`: of `Alteration`
+    `toolings`: that share it
+    `drawn`, `spread`: what the drawing says, and its standard deviation
+    `found`, `deviation`: what is believed now, and its standard deviation
     """
 
     field: str
@@ -72,11 +66,7 @@ class LearnedValue(NamedTuple):
 def learned(known: KnownToolings, drawings: Mapping[str, Drawing]) -> tuple[LearnedValue, ...]:
     """Return what the cuts taught, number by number; toolings whose models share all of a number share a row.
 
-    Parameters
-    ----------
-    known : KnownToolings
-    drawings : mapping of tooling to Drawing
-        Those that cut; others are left aside.
+    `drawings`: mapping of tooling to Drawing, those that cut; others are left aside
     """
     place = {unknown: k for k, unknown in enumerate(known.unknowns)}
     rows: dict[tuple[str, tuple[int, ...], float], list[str]] = {}

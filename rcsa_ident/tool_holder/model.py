@@ -76,15 +76,10 @@ def tool_holder_structure(
 class FreeBody:
     """A free assembly with what a spindle that turns needs to know of it.
 
-    Parameters
-    ----------
-    structure : Structure
-        Of one bending plane.
-    rotary : array, shape (d, d)
-        The rotary inertia's share of its mass. Turning with W, a slope's rate asks for a moment 2 W times it in the other plane: of a
-        thin slice the polar moment of inertia is twice the diametral one.
-    rigid : array, shape (d, 2)
-        Translation and rotation about the tip, as no spring feels them: unit deflection, unit slope.
+    `structure`: of one bending plane
+    `rotary`, shape (d, d): the rotary inertia's share of its mass. Turning with W, a slope's rate asks for a moment 2 W times it in the
+        other plane: of a thin slice the polar moment of inertia is twice the diametral one.
+    `rigid`, shape (d, 2): translation and rotation about the tip, as no spring feels them: unit deflection, unit slope
     """
 
     structure: Structure
@@ -103,18 +98,10 @@ def free_body(
 ) -> FreeBody:
     """Return what `tool_holder_structure` does, with the rotary inertia apart and the rigid-body motions.
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    max_frequency : float [Hz]
-    axis : Dof
-    shear_coefficient : callable
-    refinement : int
-    points : sequence of float [m]
-        Further points that the structure has coordinates at, behind tip and flange: distances from the tip, of the tool in front of the
-        holder's nose and of the holder from there on.
-    like : ToolAssembly, optional
-        An assembly of the same stretches whose division into elements is taken: matrices of both then have the same freedoms.
+    `max_frequency` [Hz]
+    `points`: sequence of float [m], further points that the structure has coordinates at, behind tip and flange: distances from the tip, of
+        the tool in front of the holder's nose and of the holder from there on
+    `like`: an assembly of the same stretches whose division into elements is taken: matrices of both then have the same freedoms
     """
     layered = assembly.contact is not None and assembly.insertion > 0.0
     stations, elements = _mesh(assembly, max_frequency, shear_coefficient, refinement, not layered, points, like)
@@ -154,21 +141,11 @@ def receptance_at_points(
 ) -> Receptance:
     """Return the free-free receptances between tip, flange and further points, shape (n, 4 + 2 k, 4 + 2 k).
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    omega : array, shape (n,) [rad/s]
-    points : sequence of float [m]
-        Distances from the tip, as `free_body` takes them; `point_name` tells what they are called.
-    sensor : (float, float) or None [m], [kg]
-        Where a sensor is fixed to the assembly, one of the points, and its mass.
-    axis : Dof
-        The bending plane.
-
-    Raises
-    ------
-    InputError
-        If a point lies outside the assembly.
+    `omega` [rad/s], shape (n,)
+    `points`: sequence of float [m], distances from the tip, as `free_body` takes them; `point_name` tells what they are called
+    `sensor`: (float, float) or None [m], [kg]; where a sensor is fixed to the assembly, one of the points, and its mass
+    `axis`: the bending plane
+    Raises `InputError` if a point lies outside the assembly.
 
     Examples
     --------
@@ -242,12 +219,8 @@ def tool_holder_poles(assembly: ToolAssembly, highest: float, axis: Dof = Dof.X,
 def mesh_error(assembly: ToolAssembly, omega: FloatArray, shear_coefficient: ShearCoefficient = cowper) -> float:
     """Return the relative error of the receptances against a mesh twice as fine, both solved exactly [-].
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    omega : array, shape (n,) [rad/s]
-    shear_coefficient : callable
-        As in `tool_holder_structure`.
+    `omega` [rad/s], shape (n,)
+    `shear_coefficient`: as in `tool_holder_structure`
     """
     omega = np.asarray(omega, dtype=float)
     highest = float(omega.max()) / (2.0 * np.pi)

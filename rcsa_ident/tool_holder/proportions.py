@@ -41,15 +41,7 @@ _FLUTED = 0.95
 def proportions(assembly: ToolAssembly, cutter: Cutter) -> tuple[Remark, ...]:
     """Return what is unusual about a cutter, the tool that carries it and its holder, each called as in a file.
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    cutter : Cutter
-
-    Raises
-    ------
-    InputError
-        If something is impossible.
+    Raises `InputError` if something is impossible.
     """
     found = remarks_of(_values(assembly, cutter))
     found += [each for each in _shapes(assembly, cutter) if each is not None]

@@ -78,12 +78,7 @@ def rod_structure(assembly: ToolAssembly, twisting: bool = False) -> Structure:
 def rod_poles(assembly: ToolAssembly, highest: float, twisting: bool = False) -> PoleModel:
     """Return the poles behind the axial receptances of the free assembly, between tip and flange, or behind those of its twist.
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    highest : float [rad/s]
-        Frequency up to which they are good.
-    twisting : bool
+    `highest` [rad/s]: frequency up to which they are good
     """
     return poles(rod_structure(assembly, twisting), highest)
 
@@ -92,13 +87,9 @@ def rod_poles(assembly: ToolAssembly, highest: float, twisting: bool = False) ->
 class ReducedRod:
     """A free rod in few coordinates whose mass is the identity: its rigid motion, then elastic ones.
 
-    Parameters
-    ----------
-    stiffness : complex array, shape (m, m)
-        With the materials' loss in its imaginary part.
-    damping : array, shape (m, m)
-    ports : array, shape (2, m)
-        Motion of the tip, then of the flange.
+    `stiffness`, shape (m, m): with the materials' loss in its imaginary part
+    `damping`, shape (m, m)
+    `ports`, shape (2, m): motion of the tip, then of the flange
     """
 
     stiffness: ComplexArray

@@ -44,12 +44,8 @@ _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_da
 class RoughToolHolder:
     """Reduced matrices of a tool-holder as a sum of terms, each a function of one alteration or of the modulus and one.
 
-    Parameters
-    ----------
-    terms : array, shape (t, 4, r, r)
-        Mass, damping, stiffness and structural damping of each term: see `_shares_of`.
-    loads : array, shape (3, r)
-        Unit force at the flange, unit slope there, unit force at the tip.
+    `terms`, shape (t, 4, r, r): mass, damping, stiffness and structural damping of each term: see `_shares_of`
+    `loads`, shape (3, r): unit force at the flange, unit slope there, unit force at the tip
 
     Examples
     --------
@@ -74,16 +70,10 @@ class RoughToolHolder:
         Columns: the flange's translation, translation and slope, slope; its translation and its slope per force at the tip; where `tip` is
         asked for a sixth, the tip's translation per force there.
 
-        Parameters
-        ----------
-        by : Alteration
-        omega : array, shape (n,) [rad/s]
-        lever : float [m]
-            Slopes are multiplied and moments divided by it.
-        unknowns : sequence of str
-            Fields of `Alteration` along which slopes are told.
-        tip : bool
-            Whether the tip's own receptance is asked for, too.
+        `omega` [rad/s], shape (n,)
+        `lever` [m]: slopes are multiplied and moments divided by it
+        `unknowns`: fields of `Alteration` along which slopes are told
+        `tip`: whether the tip's own receptance is asked for, too
         """
         shares, slopes = _shares_of(by)
         matrices = np.tensordot(shares, self.terms, axes=1)
@@ -97,14 +87,7 @@ class RoughToolHolder:
 
 
 def rough_tool_holder(assembly: ToolAssembly, highest: float) -> RoughToolHolder:
-    """Return the reduced matrices of a drawn assembly.
-
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    highest : float [Hz]
-        Frequency up to which the receptances are wanted.
-    """
+    """Return the reduced matrices of a drawn assembly. `highest` [Hz]: frequency up to which the receptances are wanted."""
 
     @cache
     def structure(by: Alteration) -> Structure:

@@ -14,27 +14,16 @@ class Spread:
     Shares are standard deviations of logarithms. A fluted diameter that is told by its area and second moment scales the former by its
     square and the latter by its fourth power.
 
-    Parameters
-    ----------
-    stickout : float [m]
-        A presetter's; 0.3 mm with a ruler.
-    fluted_diameter : float [-]
-        Equivalent diameter of the fluted part.
-    youngs_modulus : float [-]
-        Of the tool.
-    contact_stiffness, contact_damping : float [-]
-        Between tool and holder, translational and rotational each.
-    holder_diameter : float [-]
-        Outer diameters of the holder.
-    reclamping : float [-]
-        Of the contact in each clamping, beside what its model shares.
-    spindle_joint : float [-]
-        Of the joint in front of the flange, in each clamping.
-    segment_length : float [m]
-    corner_radius : float [m]
-        Of the cutting edge; a flat end mill's corners are usually broken.
-    stated : bool
-        Whether somebody said so: a drawing of which nothing is said counts as exact, too, but nobody vouches for it.
+    `stickout` [m]: a presetter's; 0.3 mm with a ruler
+    `fluted_diameter` [-]: equivalent diameter of the fluted part
+    `youngs_modulus` [-]: of the tool
+    `contact_stiffness`, `contact_damping` [-]: between tool and holder, translational and rotational each
+    `holder_diameter` [-]: outer diameters of the holder
+    `reclamping` [-]: of the contact in each clamping, beside what its model shares
+    `spindle_joint` [-]: of the joint in front of the flange, in each clamping
+    `segment_length` [m]
+    `corner_radius` [m]: of the cutting edge; a flat end mill's corners are usually broken
+    `stated`: whether somebody said so: a drawing of which nothing is said counts as exact, too, but nobody vouches for it
 
     Examples
     --------

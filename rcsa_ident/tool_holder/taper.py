@@ -23,14 +23,9 @@ _STAIR = 10e-3
 class Taper:
     """A taper by its name.
 
-    Parameters
-    ----------
-    name : str
-        As ``HSK-A63``, ``BT40``.
-    segments : tuple of BeamSegment
-        From the flange face, or the gauge line, to the rear end, pull stud included; of steel.
-    source : str
-        Where the dimensions come from.
+    `name`: as ``HSK-A63``, ``BT40``
+    `segments`: from the flange face, or the gauge line, to the rear end, pull stud included; of steel
+    `source`: where the dimensions come from
     """
 
     name: str
@@ -61,10 +56,7 @@ def tapers() -> tuple[str, ...]:
 def taper(name: str) -> Taper:
     """Return a taper of the library.
 
-    Raises
-    ------
-    InputError
-        Of a name that is not there.
+    Raises `InputError` of a name that is not there.
 
     Examples
     --------

@@ -50,18 +50,12 @@ def hutchinson(poisson: float, ratio: float) -> float:
 class Section:
     """Stiffness and inertia of a cross-section; or arrays of them, shape (n,), for n elements at once.
 
-    Parameters
-    ----------
-    bending : float [N m^2]
-        Bending stiffness E I.
-    shear : float [N]
-        Shear stiffness kappa G A.
-    mass : float [kg/m]
-    rotary : float [kg m]
-        Rotary inertia rho I per length.
-    loss_factor : float [-]
-    shear_loss_factor : float [-], default `loss_factor`
-        Where several materials bend as one, shear may lose another share than bending.
+    `bending` [N m^2]: bending stiffness E I
+    `shear` [N]: shear stiffness kappa G A
+    `mass` [kg/m]
+    `rotary` [kg m]: rotary inertia rho I per length
+    `loss_factor` [-]
+    `shear_loss_factor` [-], default `loss_factor`: where several materials bend as one, shear may lose another share than bending
     """
 
     bending: float | FloatArray
@@ -117,13 +111,9 @@ def section(segment: BeamSegment, shear_coefficient: ShearCoefficient = cowper) 
 def shape_functions(position: FloatArray, length: float | FloatArray, shear_ratio: float | FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return deflection and rotation shape functions, each shape (n, 4), or (m, n, 4) for m elements.
 
-    Parameters
-    ----------
-    position : array, shape (n,) [-]
-        z / length in the element.
-    length : float, or array, shape (m,) [m]
-    shear_ratio : float, or array, shape (m,) [-]
-        12 E I / (kappa G A length^2).
+    `position` [-], shape (n,): z / length in the element
+    `length`: float, or array, shape (m,) [m]
+    `shear_ratio`: float, or array, shape (m,) [-]; 12 E I / (kappa G A length^2)
     """
     x = np.asarray(position, dtype=float)
     length, p = np.asarray(length, dtype=float)[..., None], np.asarray(shear_ratio, dtype=float)[..., None]
@@ -205,11 +195,8 @@ def layer_matrices(inner: Section, outer: Section, length: float) -> tuple[Float
     First for a unit translational stiffness per metre, then for a unit rotational one; freedoms of `inner`, then of
     `outer`. The relative motion is integrated with both bodies' own shape functions.
 
-    Parameters
-    ----------
-    inner, outer : Section
-        Of the elements that lie side by side.
-    length : float [m]
+    `inner`, `outer`: of the elements that lie side by side
+    `length` [m]
     """
     nodal = np.ix_([0, 1, 2, 3, 6, 7, 8, 9], [0, 1, 2, 3, 6, 7, 8, 9])
     gap, turn = refined_layer_matrices(inner, outer, length)
@@ -219,11 +206,8 @@ def layer_matrices(inner: Section, outer: Section, length: float) -> tuple[Float
 def refined_layer_matrices(inner: Section, outer: Section, length: float | FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return what `layer_matrices` does with both bodies' inner freedoms, each shape (12, 12), or (m, 12, 12).
 
-    Parameters
-    ----------
-    inner, outer : Section
-        Of the elements that lie side by side; arrays, shape (m,), for m pairs at once.
-    length : float, or array, shape (m,) [m]
+    `inner`, `outer`: of the elements that lie side by side; arrays, shape (m,), for m pairs at once
+    `length`: float, or array, shape (m,) [m]
     """
     size = np.asarray(length, dtype=float)
     inner_w, inner_r = _refined_shapes(size, 12.0 * inner.bending / (inner.shear * size**2))

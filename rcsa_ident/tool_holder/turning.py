@@ -44,16 +44,10 @@ _UPPER = tuple((i, j) for i in range(4) for j in range(i, 4))
 class TurningToolHolder:
     """A free assembly in few coordinates whose mass is the identity: translation, rotation, elastic motions.
 
-    Parameters
-    ----------
-    stiffness : complex array, shape (m, m)
-        With the materials' loss in its imaginary part.
-    damping, rotary : arrays, shape (m, m)
-        `rotary` is the rotary inertia's share of the mass; the translation, which comes first, has none.
-    ports : array, shape (4, m)
-        Translation and slope of the tip, then of the flange.
-    highest, fastest : float [rad/s]
-        Frequency, and spindle speed of either sense, up to which it is good.
+    `stiffness`, shape (m, m): with the materials' loss in its imaginary part
+    `damping`, `rotary`, shape (m, m): `rotary` is the rotary inertia's share of the mass; the translation, which comes first, has none
+    `ports`, shape (4, m): translation and slope of the tip, then of the flange
+    `highest`, `fastest` [rad/s]: frequency, and spindle speed of either sense, up to which it is good
     """
 
     stiffness: ComplexArray
@@ -71,15 +65,9 @@ class TurningToolHolder:
     def of(cls, assembly: ToolAssembly, highest: float, fastest: float, shear_coefficient: ShearCoefficient = cowper) -> Self:
         """Return the reduced assembly; its coordinates are its own exact solutions at a few frequencies, turning both ways.
 
-        Parameters
-        ----------
-        assembly : ToolAssembly
-        highest : float [rad/s]
-            Frequency up to which it is good.
-        fastest : float [rad/s]
-            Spindle speed up to which it is good.
-        shear_coefficient : callable
-            As in `tool_holder_structure`.
+        `highest` [rad/s]: frequency up to which it is good
+        `fastest` [rad/s]: spindle speed up to which it is good
+        `shear_coefficient`: as in `tool_holder_structure`
         """
         body = free_body(assembly, highest / (2.0 * np.pi), shear_coefficient=shear_coefficient)
         structure, rotary = body.structure, body.rotary
@@ -101,11 +89,8 @@ class TurningToolHolder:
     def pair(self, omega: FloatArray, ratio: float | FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return A+ and A-, shape (n, 4, 4) each.
 
-        Parameters
-        ----------
-        omega : array, shape (n,) [rad/s], above 0
-        ratio : float or array, shape (n,)
-            Spindle speed over frequency.
+        `omega`: array, shape (n,) [rad/s], above 0
+        `ratio`: float or array, shape (n,); spindle speed over frequency
         """
         omega, ratio = np.broadcast_arrays(np.asarray(omega, dtype=float), np.asarray(ratio, dtype=float))
         speed = ratio * omega
@@ -118,11 +103,9 @@ class TurningToolHolder:
     def at_speed(self, omega: FloatArray, speed: float, places: Sequence[tuple[int, int]]) -> tuple[ComplexArray, ComplexArray]:
         """Return some entries (row, column) of A+ and A- at one spindle speed, shape (g, n) each: many frequencies from its poles.
 
-        Parameters
-        ----------
-        omega : array, shape (n,) [rad/s], above 0
-        speed : float [rad/s]
-        places : sequence of (row, column)
+        `omega`: array, shape (n,) [rad/s], above 0
+        `speed` [rad/s]
+        `places`: sequence of (row, column)
         """
         rows, columns = np.array(places).T
         if omega.size > _MANY and abs(speed) > _SLOW * self.highest:
@@ -200,13 +183,8 @@ def turning_pair(
 def turning_tool_holder(assembly: ToolAssembly, highest: float, speed: float) -> TurningToolHolder:
     """Return a reduced assembly that is good for a spindle speed; those who ask at many speeds find it made.
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    highest : float [rad/s]
-        Frequency up to which it is good.
-    speed : float [rad/s]
-        Of either sense.
+    `highest` [rad/s]: frequency up to which it is good
+    `speed` [rad/s]: of either sense
     """
     return _kept(assembly, highest, 2.0 ** float(np.ceil(np.log2(max(abs(speed), 1.0)))))
 
@@ -221,14 +199,9 @@ def entries_at_speed(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return some entries (row, column) of A+ and A- at one spindle speed, shape (g, n) each.
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    omega : array, shape (n,) [rad/s], above 0, ascending
-    speed : float [rad/s]
-        Positive where the cutter turns from +Y to +X.
-    places : sequence of (row, column)
-        Of translation and slope of the tip, then of the flange.
+    `omega`: array, shape (n,) [rad/s], above 0, ascending
+    `speed` [rad/s]: positive where the cutter turns from +Y to +X
+    `places`: sequence of (row, column); of translation and slope of the tip, then of the flange
     """
     return turning_tool_holder(assembly, float(omega[-1]), speed).at_speed(omega, speed, places)
 
@@ -236,17 +209,9 @@ def entries_at_speed(
 def turning_receptance(assembly: ToolAssembly, omega: FloatArray, speed: float) -> Receptance:
     """Return the free receptances of both bending planes at one spindle speed, shape (n, 8, 8).
 
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    omega : array, shape (n,) [rad/s], above 0, ascending
-    speed : float [rad/s]
-        Positive where the cutter turns from +Y to +X.
-
-    Returns
-    -------
-    Receptance
-        Points ``tip`` and ``flange``, each with translation and slope of X, then of Y.
+    `omega`: array, shape (n,) [rad/s], above 0, ascending
+    `speed` [rad/s]: positive where the cutter turns from +Y to +X
+    Returns Receptance: points ``tip`` and ``flange``, each with translation and slope of X, then of Y.
     """
     omega = frozen(omega)
     forward, backward = (_symmetric(each) for each in entries_at_speed(assembly, omega, speed, _UPPER))

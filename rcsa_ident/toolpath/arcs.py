@@ -18,10 +18,7 @@ _SAME = 1e-9
 def centre_of(start: tuple[float, float], end: tuple[float, float], radius: float, clockwise: bool) -> tuple[float, float]:
     """Return the centre of an arc of a told radius [m] in its plane; a negative one says the longer way around.
 
-    Raises
-    ------
-    InputError
-        If the ends are one, or further apart than the diameter.
+    Raises `InputError` if the ends are one, or further apart than the diameter.
 
     Examples
     --------
@@ -43,10 +40,7 @@ def centre_of(start: tuple[float, float], end: tuple[float, float], radius: floa
 def turned(start: tuple[float, float], end: tuple[float, float], centre: tuple[float, float], clockwise: bool) -> float:
     """Return by which angle an arc turns about its centre [rad], below 0 clockwise; a full turn where the ends are one.
 
-    Raises
-    ------
-    InputError
-        If the ends stand at different distances from the centre.
+    Raises `InputError` if the ends stand at different distances from the centre.
 
     Examples
     --------
@@ -87,17 +81,10 @@ def chords(
 ) -> FloatArray:
     """Return the ends of an arc's chords, shape (count, 3) [m]; the last one is the arc's end itself.
 
-    Parameters
-    ----------
-    start, end : arrays, shape (3,) [m]
-        Apart along the plane's normal the arc is a helix.
-    centre : pair of float [m]
-        In the plane.
-    plane : three of int
-        The plane's two axes and its normal, right-handed.
-    angle : float [rad]
-        By which it turns.
-    count : int
+    `start`, `end` [m], shape (3,): apart along the plane's normal the arc is a helix
+    `centre`: pair of float [m], in the plane
+    `plane`: three of int, the plane's two axes and its normal, right-handed
+    `angle` [rad]: by which it turns
 
     Examples
     --------

@@ -34,10 +34,7 @@ class QuadraticBlend:
 
     A corner between the velocities v and w is passed at a distance of |w - v| seconds / 8, without delay.
 
-    Parameters
-    ----------
-    seconds : float [s]
-        Width of the window: how long it turns from one move into the next.
+    `seconds` [s]: width of the window: how long it turns from one move into the next
 
     Examples
     --------
@@ -88,10 +85,7 @@ class FirstOrderLag:
 
     A right angle at the speed v is passed at a distance of 0.509 v T.
 
-    Parameters
-    ----------
-    seconds : float [s]
-        T.
+    `seconds` [s]: T
 
     Examples
     --------

@@ -38,20 +38,13 @@ class Place(StrEnum):
 class CompensatedPath:
     """A path to command, and what it leaves.
 
-    Parameters
-    ----------
-    path : ToolPath
-    correction : array, shape (k, 3) [m]
-    became : tuple of Place
-        Of each place.
-    controller, before, after : Deviation
-        Of drives that give way to nothing; of the path as it was and of the commanded one, on the machine that compensates.
-    draws : tuple of Deviation
-        Of the commanded path on other machines that what is known allows.
-    postures : array, shape (k, j) [rad], or None
-        Of an arm's drives along it.
-    loose : array, shape (k,) [m], or None
-        How far an arm's tool may be to either side within the play of drives that no torque holds on one.
+    `correction` [m], shape (k, 3)
+    `became`: of each place
+    `controller`, `before`, `after`: of drives that give way to nothing; of the path as it was and of the commanded one, on the machine that
+        compensates
+    `draws`: of the commanded path on other machines that what is known allows
+    `postures` [rad], shape (k, j): of an arm's drives along it
+    `loose` [m], shape (k,): how far an arm's tool may be to either side within the play of drives that no torque holds on one
     """
 
     path: ToolPath
@@ -75,16 +68,10 @@ def ahead_of_force(
 ) -> Sequence[Sent]:
     """Return the places to command along a path, q + K^-1 tau, play to the torque's side.
 
-    Parameters
-    ----------
-    angles : array, shape (k, n) [rad]
-        Of all freedoms on the ideal path, those included that no drive moves.
-    torques : array, shape (k, n) [N m]
-        That the springs must give there: of the motion, less those of the forces on the tool.
-    twist : callable
-        From torques (n,) that springs must give to how far they are turned for it (n,).
-    place : callable
-        From angles (n,) to what the machine is sent to.
+    `angles` [rad], shape (k, n): of all freedoms on the ideal path, those included that no drive moves
+    `torques` [N m], shape (k, n): that the springs must give there: of the motion, less those of the forces on the tool
+    `twist`: from torques (n,) that springs must give to how far they are turned for it (n,)
+    `place`: from angles (n,) to what the machine is sent to
 
     Examples
     --------
@@ -101,13 +88,8 @@ def ahead_of_force(
 def mirrored(places: FloatArray, reached: Callable[[FloatArray], FloatArray], passes: int = 1) -> FloatArray:
     """Return the places to command, shape (k, 3) [m]: p - (p_reached - p), again from there as often as wanted.
 
-    Parameters
-    ----------
-    places : array, shape (k, 3) [m]
-        Where the tool should be.
-    reached : callable
-        From commanded places (k, 3) to where the tool is then, (k, 3).
-    passes : int
+    `places` [m], shape (k, 3): where the tool should be
+    `reached`: from commanded places (k, 3) to where the tool is then, (k, 3)
 
     Examples
     --------

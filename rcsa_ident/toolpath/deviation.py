@@ -18,14 +18,10 @@ _STRAIGHT = 1e-5
 class Deviation:
     """How far a tool is from its path.
 
-    Parameters
-    ----------
-    across : array, shape (k, 3) [m]
-        From each of the path's places to where the tool is when it should be there, what lies along the path left aside.
-    straight : array of bool, shape (k,)
-        Places of moves at a feed where the controller goes where it is sent.
-    blended : array of bool, shape (k,)
-        Places of such moves that the controller cuts short.
+    `across` [m], shape (k, 3): from each of the path's places to where the tool is when it should be there, what lies along the path left
+        aside
+    `straight`: array of bool, shape (k,); places of moves at a feed where the controller goes where it is sent
+    `blended`: array of bool, shape (k,); places of such moves that the controller cuts short
 
     Examples
     --------
@@ -45,12 +41,8 @@ class Deviation:
     def of(cls, path: ToolPath, tips: FloatArray, followed: FloatArray) -> Deviation:
         """Return the deviation of tips, shape (k, 3) [m], from a path's places.
 
-        Parameters
-        ----------
-        path : ToolPath
-        tips : array, shape (k, 3) [m]
-        followed : array, shape (k, 3) [m]
-            Where the controller alone would have the tool, without forces and compensation.
+        `tips` [m], shape (k, 3)
+        `followed` [m], shape (k, 3): where the controller alone would have the tool, without forces and compensation
         """
         for name, places in (("tips", tips), ("followed", followed)):
             if np.shape(places) != path.places.shape:

@@ -28,13 +28,9 @@ _LINE = 16 * _ROOM + 2
 class Surface(NamedTuple):
     """A closed surface of triangles.
 
-    Parameters
-    ----------
-    points : array, shape (v, 3) [m]
-    faces : array of int, shape (f, 3)
-        Counterclockwise from outside.
-    remarks : tuple of Remark
-        What was remarked as its file was read.
+    `points` [m], shape (v, 3)
+    `faces`: array of int, shape (f, 3); counterclockwise from outside
+    `remarks`: what was remarked as its file was read
     """
 
     points: FloatArray
@@ -67,19 +63,12 @@ class DexelField(Shown):
     The lattice fills a block evenly, each node in the middle of its cell, so that a block has its own volume. What removes material
     shortens the lines in place.
 
-    Parameters
-    ----------
-    low, high : arrays, shape (3,) [m]
-        Of the block that the lattice fills.
-    shape : tuple of three int
-        Nodes along x, y, z.
-    segs : tuple of three arrays, shape (m, n, room, 2) [m]
-        Where the segments of each line begin and end, of the lines along x, which stand by (z, y), along y, by (z, x), and along z,
-        by (x, y).
-    counts : tuple of three arrays of int, shape (m, n)
-        Segments of each line.
-    remarks : tuple of Remark
-        What was remarked as the file was read from which it came.
+    `low`, `high` [m], shape (3,): of the block that the lattice fills
+    `shape`: tuple of three int, nodes along x, y, z
+    `segs`: tuple of three arrays, shape (m, n, room, 2) [m]; where the segments of each line begin and end, of the lines along x, which
+        stand by (z, y), along y, by (z, x), and along z, by (x, y)
+    `counts`: tuple of three arrays of int, shape (m, n); segments of each line
+    `remarks`: what was remarked as the file was read from which it came
 
     Examples
     --------
@@ -99,14 +88,7 @@ class DexelField(Shown):
 
     @classmethod
     def block(cls, low: FloatArray, high: FloatArray, cell: float) -> DexelField:
-        """Return a full block.
-
-        Parameters
-        ----------
-        low, high : arrays, shape (3,) [m]
-        cell : float [m]
-            Between lines, at most.
-        """
+        """Return a full block. `low`, `high` [m], shape (3,). `cell` [m]: between lines, at most."""
         field = cls._empty(low, high, cell)
         for (along, _, _), seg, count in zip(GRIDS, field.segs, field.counts, strict=True):
             seg[:, :, 0, 0], seg[:, :, 0, 1] = field.low[along], field.high[along]
@@ -117,18 +99,10 @@ class DexelField(Shown):
     def from_mesh(cls, points: FloatArray, faces: FloatArray, cell: float) -> DexelField:
         """Return the inside of a closed surface of triangles.
 
-        Parameters
-        ----------
-        points : array, shape (v, 3) [m]
-        faces : array of int, shape (f, 3)
-            Counterclockwise from outside.
-        cell : float [m]
-            Between lines, at most.
-
-        Raises
-        ------
-        InputError
-            If the surface is not closed: says how many edges belong to one triangle alone.
+        `points` [m], shape (v, 3)
+        `faces`: array of int, shape (f, 3); counterclockwise from outside
+        `cell` [m]: between lines, at most
+        Raises `InputError` if the surface is not closed: says how many edges belong to one triangle alone.
         """
         points, faces = np.ascontiguousarray(points, dtype=float), np.ascontiguousarray(faces, dtype=np.int64)
         check_closed(points, faces)
@@ -214,12 +188,9 @@ class DexelField(Shown):
     def heights_beside(self, start: FloatArray, stop: FloatArray, reach: float, level: float) -> tuple[float, float] | None:
         """Return between which heights there is material above a level near a line in the plane, [m]; None where there is none.
 
-        Parameters
-        ----------
-        start, stop : arrays, shape (2,) [m]
-        reach : float [m]
-            From the line.
-        level : float [m]
+        `start`, `stop` [m], shape (2,)
+        `reach` [m]: from the line
+        `level` [m]
         """
         ends = np.stack([start, stop])
         first, step = self.lattice[0, :2], self.lattice[1, :2]
@@ -271,10 +242,7 @@ class DexelField(Shown):
 def check_closed(points: FloatArray, faces: FloatArray) -> None:
     """Refuse a surface of triangles that is not closed, or whose triangles do not all face outwards.
 
-    Raises
-    ------
-    InputError
-        Says how many edges stand alone.
+    Raises `InputError`: says how many edges stand alone.
     """
     if points.ndim != 2 or points.shape[1:] != (3,) or faces.ndim != 2 or faces.shape[1:] != (3,) or not len(faces):
         raise InputError("mesh", [points.shape, faces.shape], "points, shape (v, 3), and one or more triangles, shape (f, 3)")

@@ -31,20 +31,14 @@ class PathEngagement(Shown):
 
     Angles are immersion angles, clockwise from the normal Y of the move seen from the spindle; the move's part across the tool's axis is X.
 
-    Parameters
-    ----------
-    move : array of int, shape (n,)
-        Of each arc the move that it belongs to, ascending; move i goes from place i to place i + 1 of the path.
-    height : array, shape (n,) [m]
-        Of the slice across the tool's axis, above its tip; never falling within a move.
-    start, end : arrays, shape (n,) [rad]
-        0 to a full turn; arcs through 0 are two.
-    extent : array, shape (k, 2) [m]
-        Between which heights above the tip each move meets material; where it meets none, the first is above the second.
-    feed_rise : array, shape (k,) [rad]
-        By which each move climbs along the tool's axis.
-    volume : array, shape (k,) [m^3]
-        That each move takes out.
+    `move`: array of int, shape (n,); of each arc the move that it belongs to, ascending; move i goes from place i to place i + 1 of the
+        path
+    `height` [m], shape (n,): of the slice across the tool's axis, above its tip; never falling within a move
+    `start`, `end` [rad], shape (n,): 0 to a full turn; arcs through 0 are two
+    `extent` [m], shape (k, 2): between which heights above the tip each move meets material; where it meets none, the first is above the
+        second
+    `feed_rise` [rad], shape (k,): by which each move climbs along the tool's axis
+    `volume` [m^3], shape (k,): that each move takes out
     """
 
     move: np.ndarray
@@ -271,13 +265,9 @@ def chip_between_circles(shift: FloatArray, radius: float, angle: FloatArray) ->
 
     rho = D n + sqrt(R^2 - |D|^2 + (D n)^2), h = max(0, R - rho), n the direction of the angle.
 
-    Parameters
-    ----------
-    shift : array, shape (2,) [m]
-        D, from where the centre is to where it was when the tooth before cut, along feed X and normal Y.
-    radius : float [m]
-    angle : array [rad]
-        Immersion angles, clockwise from Y.
+    `shift` [m], shape (2,): D, from where the centre is to where it was when the tooth before cut, along feed X and normal Y
+    `radius` [m]
+    `angle` [rad]: immersion angles, clockwise from Y
 
     Examples
     --------
@@ -296,13 +286,8 @@ def chip_between_circles(shift: FloatArray, radius: float, angle: FloatArray) ->
 def chip_thickness(solid: ToolSolid, feed: FloatArray, angle: FloatArray, height: FloatArray) -> FloatArray:
     """Return the chip thickness square to the edge, of a feed per tooth in any direction: its part along the surface's normal.
 
-    Parameters
-    ----------
-    solid : ToolSolid
-    feed : array, shape (3,) [m]
-        Per tooth, along X, Y and the tool's axis, towards the spindle.
-    angle, height : arrays that go together [rad, m]
-        Immersion angles, and heights above the tip.
+    `feed` [m], shape (3,): per tooth, along X, Y and the tool's axis, towards the spindle
+    `angle`, `height`: arrays that go together [rad, m]; immersion angles, and heights above the tip
 
     Examples
     --------

@@ -26,11 +26,8 @@ _ROUNDED = 1e-6
 class ForceAlongPath:
     """Forces of the workpiece on the tool over the path's time, in the axes of the base; the first and the last one hold beyond.
 
-    Parameters
-    ----------
-    time : array, shape (m,) [s]
-        Rising.
-    force : array, shape (m, 3) [N]
+    `time` [s], shape (m,): rising
+    `force` [N], shape (m, 3)
 
     Examples
     --------
@@ -96,12 +93,8 @@ class ForceAlongPath:
 def on_all_moves(path: ToolPath, force: FloatArray, of_path: bool = False) -> ForceAlongPath:
     """Return the same force on all cutting moves of a path, none on the rapid ones.
 
-    Parameters
-    ----------
-    path : ToolPath
-    force : array, shape (3,) [N]
-        In the base's axes; or, `of_path`, along the feed, to its left as seen against the tool's axis, and along the tool's axis.
-    of_path : bool
+    `force` [N], shape (3,): in the base's axes; or, `of_path`, along the feed, to its left as seen against the tool's axis, and along the
+        tool's axis
 
     Examples
     --------

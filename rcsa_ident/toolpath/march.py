@@ -35,21 +35,13 @@ SOLVED = 1e-12
 class Carrier:
     """What carries a tool: M q'' + D q' + K q = load + motion^T F with springs that may have play, and modes beside it; rigid by default.
 
-    Parameters
-    ----------
-    mass, damping : arrays, shape (n, n)
-    stiffness : array, shape (n,)
-        Each freedom has a spring of its own, as a joint has.
-    motion : array, shape (3, n)
-        Of the tool's tip along the feed, its normal and the axis towards the spindle, with each freedom.
-    play : array, shape (n,), default none
-        Half of it: a spring feels nothing within.
-    load : array, shape (n,), default none
-        That is always there, as weight is.
-    zero : array, shape (3,), default none [m]
-        Where the tip counts as on its path: the sag at which the workpiece was touched.
-    modes : PoleResidue or None
-        From the force to what the tip moves by besides, 3 by 3.
+    `mass`, `damping`, shape (n, n)
+    `stiffness`, shape (n,): each freedom has a spring of its own, as a joint has
+    `motion`, shape (3, n): of the tool's tip along the feed, its normal and the axis towards the spindle, with each freedom
+    `play`: array, shape (n,), default none; half of it: a spring feels nothing within
+    `load`: array, shape (n,), default none; that is always there, as weight is
+    `zero`: array, shape (3,), default none [m]; where the tip counts as on its path: the sag at which the workpiece was touched
+    `modes`: from the force to what the tip moves by besides, 3 by 3
 
     Examples
     --------
@@ -84,18 +76,10 @@ class Carrier:
     def at_tip(cls, structure: Structure, lever: float = 0.0, play: FloatArray | None = None, load: FloatArray | None = None) -> Carrier:
         """Return a structure whose freedoms have springs of their own as what carries a tip.
 
-        Parameters
-        ----------
-        structure : Structure
-            Over x, its slope, y, its slope and z where a tool-holder sits, in the feed's axes (`FlexibleRobot.at`).
-        lever : float [m]
-            From there to the tip; what lies between is rigid.
-        play, load : arrays, shape (n,), optional
-
-        Raises
-        ------
-        InputError
-            If its springs couple freedoms.
+        `structure`: over x, its slope, y, its slope and z where a tool-holder sits, in the feed's axes (`FlexibleRobot.at`)
+        `lever` [m]: from there to the tip; what lies between is rigid
+        `play`, `load`, shape (n,)
+        Raises `InputError` if its springs couple freedoms.
         """
         springs = np.diag(structure.stiffness)
         if np.any(np.abs(structure.stiffness - np.diag(springs)) > 1e-12 * springs.max()) or structure.structural_damping.any():
@@ -139,17 +123,10 @@ class Carrier:
 class Cut:
     """How the tool turns and what it takes.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    coefficients : CuttingCoefficients
-    depth : float [m]
-        Axial, from the tip up.
-    spindle_speed : float [rad/s]
-    slices : int, default 6
-        Of what stands between bottom and depth.
-    bottom : float, default 0 [m]
-        Height above the tip below which there is no material beside the path.
+    `depth` [m]: axial, from the tip up
+    `spindle_speed` [rad/s]
+    `slices`: int, default 6; of what stands between bottom and depth
+    `bottom` [m], default 0: height above the tip below which there is no material beside the path
     """
 
     cutter: Cutter
@@ -182,26 +159,15 @@ class Cut:
 class March:
     """What happened in a march, and where it can go on.
 
-    Parameters
-    ----------
-    step : float [s]
-    time : array, shape (k,) [s]
-    force : array, shape (k, 3) [N]
-        On the tool along the feed, its normal and the axis towards the spindle.
-    tip : array, shape (k, 3) [m]
-        By which the tip is off its path.
-    unsettled : int
-        Instants at which force and deflection did not agree within a tenth of a micrometre; as a rule they do within `SOLVED`.
-    lost : bool
-        Whether the tip was ever off its path by more than `LOST` radii: what follows means nothing.
-    state : array, shape (3, n)
-        Deflections, rates and accelerations of the carrier's freedoms at the end.
-    swing : complex array, shape (m,)
-        Of its modes.
-    angle : float [rad]
-        Of tooth 1 at the next instant.
-    trail, held : arrays, shapes (teeth, slices, m, 2) [m] and (teeth, slices)
-        Where each edge stood lately, and of how many instants.
+    `step` [s]; `time` [s], shape (k,)
+    `force` [N], shape (k, 3): on the tool along the feed, its normal and the axis towards the spindle
+    `tip` [m], shape (k, 3): by which the tip is off its path
+    `unsettled`: instants at which force and deflection did not agree within a tenth of a micrometre; as a rule they do within `SOLVED`
+    `lost`: whether the tip was ever off its path by more than `LOST` radii: what follows means nothing
+    `state`, shape (3, n): deflections, rates and accelerations of the carrier's freedoms at the end
+    `swing`, shape (m,): of its modes
+    `angle` [rad]: of tooth 1 at the next instant
+    `trail`, `held`: arrays, shapes (teeth, slices, m, 2) [m] and (teeth, slices); where each edge stood lately, and of how many instants
     """
 
     step: float
@@ -220,14 +186,8 @@ class March:
 def start_of(carrier: Carrier, cut: Cut, step: float, time: float = 0.0, angle: float = 0.0) -> March:
     """Return the state before a march: at rest under the carrier's load, no edge has been anywhere.
 
-    Parameters
-    ----------
-    carrier : Carrier
-    cut : Cut
-    step : float [s]
-    time : float [s]
-    angle : float [rad]
-        Of tooth 1, clockwise from the normal.
+    `step` [s]; `time` [s]
+    `angle` [rad]: of tooth 1, clockwise from the normal
     """
     state = np.zeros((3, carrier.stiffness.size))
     state[0] = carrier.rest
@@ -305,19 +265,12 @@ def mill_block(
 ) -> tuple[March, Walls]:
     """Return a straight pass along a block, from where the cutter begins to touch it to where its centre leaves it, and the walls left.
 
-    Parameters
-    ----------
-    carrier : Carrier
-    cut : Cut
-    length : float [m]
-    sides : tuple of float [m]
-        Of the block, along the normal from the path, the lower one first; infinite where the cutter does not come to them.
-    feed_per_tooth : float [m]
-        On average over the teeth.
-    steps : int
-        A revolution.
-    spacing : float [m]
-        Of the walls' columns.
+    `length` [m]
+    `sides`: tuple of float [m], of the block, along the normal from the path, the lower one first; infinite where the cutter does not come
+        to them
+    `feed_per_tooth` [m]: on average over the teeth
+    `steps`: a revolution
+    `spacing` [m]: of the walls' columns
     """
     parts, step = cut.parts, 2.0 * np.pi / cut.spindle_speed / steps
     reach = float(np.max(parts.radius + parts.offset.max(axis=0)))

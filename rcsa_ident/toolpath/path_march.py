@@ -37,38 +37,21 @@ _NOWHERE, _LEVEL, _SLOPE = 1e-7, 2e-5, 0.01
 class MilledPart:
     """What happened on a part of a move, turn by turn; axes of the machine.
 
-    Parameters
-    ----------
-    move : int
-    places : array, shape (n, 3) [m]
-        Where the tip was sent in the middle of each turn.
-    time : array, shape (n,) [s]
-    mean_force : array, shape (n, 3) [N]
-        On the tool.
-    peak_force : array, shape (n,) [N]
-        Across the axis.
-    mean_tip : array, shape (n, 3) [m]
-        By which the tip was off.
-    once : array, shape (n, 2) [m]
-        The tip at the same angle of each turn: it stands still where a cut repeats itself.
-    within : array, shape (n,) [m]
-        By which the tip stands elsewhere at angles of the turn at which the teeth stand alike; 0 of a cutter that has one such angle.
-    swing : array, shape (n,) [m]
-        From end to end of its way across the axis.
-    frame : PathFrame
-    walls : Walls
-        What is left, in the frame's axes.
-    cut : array, shape (2, slices, columns)
-        Which columns of the walls the tool has cut.
-    done : float [m]
-        Up to where along them the walls are finished.
-    radii : array, shape (slices,) [m]
-    heights : array, shape (slices,) [m]
-        Of the slices above the tip.
-    level : float [m]
-        Where the tip was sent along z.
-    unsettled : int
-    lost : bool
+    `places` [m], shape (n, 3): where the tip was sent in the middle of each turn
+    `time` [s], shape (n,)
+    `mean_force` [N], shape (n, 3): on the tool
+    `peak_force` [N], shape (n,): across the axis
+    `mean_tip` [m], shape (n, 3): by which the tip was off
+    `once` [m], shape (n, 2): the tip at the same angle of each turn: it stands still where a cut repeats itself
+    `within` [m], shape (n,): by which the tip stands elsewhere at angles of the turn at which the teeth stand alike; 0 of a cutter that has
+        one such angle
+    `swing` [m], shape (n,): from end to end of its way across the axis
+    `walls`: what is left, in the frame's axes
+    `cut`, shape (2, slices, columns): which columns of the walls the tool has cut
+    `done` [m]: up to where along them the walls are finished
+    `radii` [m], shape (slices,)
+    `heights` [m], shape (slices,): of the slices above the tip
+    `level` [m]: where the tip was sent along z
     """
 
     move: int
@@ -108,12 +91,8 @@ class MilledPart:
 class MarchOptions:
     """How finely a march goes.
 
-    Parameters
-    ----------
-    steps : int
-        A turn, at least: more where modes of the tip swing fast beside it.
-    spacing : float [m]
-        Of the walls' columns.
+    `steps`: a turn, at least: more where modes of the tip swing fast beside it
+    `spacing` [m]: of the walls' columns
     """
 
     steps: int = 360
@@ -136,20 +115,9 @@ def mill_along(
     Level moves of an upright tool at a feed are marched; on all others, and where a tool is not near the material, it is taken to be at
     rest. A force beside the walls of the slices, of a floor that is lowered, is left out.
 
-    Parameters
-    ----------
-    sweep : Sweep
-        Fresh; its field is cut. Its path has feeds and spindle speeds on all moves that cut.
-    cutter : Cutter
-    coefficients : CuttingCoefficients
-    carriers : callable
-        What carries the tool on a move, along the frame's x, its y and the axis.
-    options : MarchOptions
-
-    Raises
-    ------
-    InputError
-        If a move at a feed has no spindle speed, or no feed is told.
+    `sweep`: fresh; its field is cut. Its path has feeds and spindle speeds on all moves that cut.
+    `carriers`: what carries the tool on a move, along the frame's x, its y and the axis
+    Raises `InputError` if a move at a feed has no spindle speed, or no feed is told.
     """
     path = sweep.path
     times, marcher = path.times, _Marcher(sweep, cutter, coefficients, carriers, options)

@@ -35,14 +35,8 @@ class Sweep(Shown):
     An upright tool whose outline rises to one peak is exact on level and vertical moves, a convex one on ramps, too; all other moves
     are cut up into places, within a tolerance.
 
-    Parameters
-    ----------
-    field : DexelField
-        Cut in place.
-    solid : ToolSolid
-    path : ToolPath
-    tolerance : float [m], default a hundredth of the distance between lines
-        By which the cut surface may stand off the exact one.
+    `field`: cut in place
+    `tolerance` [m], default a hundredth of the distance between lines: by which the cut surface may stand off the exact one
 
     Examples
     --------
@@ -157,17 +151,11 @@ class Sweep(Shown):
 def made_by(points: FloatArray, path: ToolPath, moves: np.ndarray, radius: float, near: float) -> np.ndarray:
     """Return the last of some moves that passed each point of a surface, shape (v,); -1 where none did.
 
-    Parameters
-    ----------
-    points : array, shape (v, 3) [m]
-    path : ToolPath
-        Of an upright tool.
-    moves : array of int
-        Ascending.
-    radius : float [m]
-        Of the tool.
-    near : float [m]
-        How far a point may lie beside the tool's wall or below its tip.
+    `points` [m], shape (v, 3)
+    `path`: of an upright tool
+    `moves`: ascending
+    `radius` [m]: of the tool
+    `near` [m]: how far a point may lie beside the tool's wall or below its tip
     """
     found = np.full(len(points), -1, dtype=np.int64)
     if not len(points) or not len(moves):
@@ -193,17 +181,10 @@ def surface_made_by(
 ) -> tuple[FloatArray, np.ndarray, np.ndarray]:
     """Return the surface that is left, as `DexelField.mesh`, and of each triangle the last of some moves that made it, shape (f,).
 
-    Parameters
-    ----------
-    field : DexelField
-    path : ToolPath
-        Of an upright tool.
-    moves : array of int
-        Ascending.
-    radius : float [m]
-        Of the tool.
-    most : int
-        Triangles.
+    `path`: of an upright tool
+    `moves`: ascending
+    `radius` [m]: of the tool
+    `most`: triangles
     """
     points, faces = field.mesh(most)
     corners = points[faces]

@@ -25,14 +25,9 @@ _CORNER = 0.3
 class ToolSolid(Shown):
     """A solid of revolution about the tool's axis, from its tip up.
 
-    Parameters
-    ----------
-    heights : array, shape (p,) [m]
-        Above the tip, from 0, never falling.
-    radii : array, shape (p,) [m]
-        At these heights; between them they change on straight lines.
-    edge : float [m]
-        Height up to which there are edges; what is above is shank.
+    `heights` [m], shape (p,): above the tip, from 0, never falling
+    `radii` [m], shape (p,): at these heights; between them they change on straight lines
+    `edge` [m]: height up to which there are edges; what is above is shank
 
     Examples
     --------
@@ -63,14 +58,9 @@ class ToolSolid(Shown):
     def of(cls, cutter: Cutter, length: float | None = None, chord: float = _CHORD) -> ToolSolid:
         """Return the solid of a cutter that runs true.
 
-        Parameters
-        ----------
-        cutter : Cutter
-        length : float or None [m]
-            From the tip to where the shank ends, which is as wide as the edges are where they end; None ends it with the edges. Edges of
-            which nobody told where they end are as long as that.
-        chord : float [m]
-            By which the chords that stand for an arc may leave it.
+        `length` [m]: from the tip to where the shank ends, which is as wide as the edges are where they end; None ends it with the edges.
+            Edges of which nobody told where they end are as long as that.
+        `chord` [m]: by which the chords that stand for an arc may leave it
         """
         points: list[tuple[float, float]] = []
         for segment in cutter.outline.segments:

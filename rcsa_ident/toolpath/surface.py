@@ -19,18 +19,11 @@ _END = 0.5
 class Roughness(NamedTuple):
     """Parameters of ISO 21920-2 over an evaluation length, behind the filter of ISO 16610-21.
 
-    Parameters
-    ----------
-    mean : float [m]
-        Ra, arithmetic mean height.
-    rms : float [m]
-        Rq, root mean square height.
-    total : float [m]
-        Rt, from the deepest place to the highest one.
-    cutoff : float [m]
-        Of the filter between roughness and waviness, lambda_c (nesting index N_ic).
-    length : float [m]
-        That was evaluated.
+    `mean` [m]: Ra, arithmetic mean height
+    `rms` [m]: Rq, root mean square height
+    `total` [m]: Rt, from the deepest place to the highest one
+    `cutoff` [m]: of the filter between roughness and waviness, lambda_c (nesting index N_ic)
+    `length` [m]: that was evaluated
     """
 
     mean: float
@@ -45,18 +38,10 @@ def roughness(profile: FloatArray, spacing: float, cutoff: float = 0.8e-3) -> Ro
 
     A straight line is taken off first, then what the Gaussian filter lets pass of longer waves; half a cut-off is left out at both ends.
 
-    Parameters
-    ----------
-    profile : array, shape (n,) [m]
-        Heights at places that are evenly apart.
-    spacing : float [m]
-    cutoff : float [m]
-        0.8 mm goes with Ra from 0.1 to 2 um.
-
-    Raises
-    ------
-    InputError
-        If the profile is shorter than two cut-offs.
+    `profile` [m], shape (n,): heights at places that are evenly apart
+    `spacing` [m]
+    `cutoff` [m]: 0.8 mm goes with Ra from 0.1 to 2 um
+    Raises `InputError` if the profile is shorter than two cut-offs.
 
     Examples
     --------

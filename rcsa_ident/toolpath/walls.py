@@ -23,14 +23,7 @@ _MOST = 100_000_000
 
 
 class PathFrame(NamedTuple):
-    """Axes in the plane: x along a path, y to its left.
-
-    Parameters
-    ----------
-    origin : array, shape (2,) [m]
-    angle : float [rad]
-        Of x, counterclockwise.
-    """
+    """Axes in the plane: x along a path, y to its left. `origin` [m], shape (2,). `angle` [rad]: of x, counterclockwise."""
 
     origin: FloatArray
     angle: float
@@ -74,15 +67,10 @@ class Walls:
     def block(cls, length: float, y_from: float, y_to: float, slices: int, margin: float, spacing: float = 4e-6) -> Walls:
         """Return the walls of a block that begins at x = 0, the path being y = 0.
 
-        Parameters
-        ----------
-        length : float [m]
-        y_from, y_to : float [m]
-            Its sides; infinite where the tool does not come to them.
-        slices : int
-        margin : float [m]
-            Of columns before and behind it: as far as the cutter reaches.
-        spacing : float [m]
+        `length` [m]
+        `y_from`, `y_to` [m]: its sides; infinite where the tool does not come to them
+        `margin` [m]: of columns before and behind it: as far as the cutter reaches
+        `spacing` [m]
 
         Examples
         --------

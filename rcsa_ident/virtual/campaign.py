@@ -12,12 +12,9 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 class SimulatedRecord:
     """One record with what was true while it was made.
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-    tooth_angle : float [rad]
-        Immersion of tooth 1 at the first sample.
-    channels : mapping of str to array, shape (n,)
+    `spindle_speed` [rad/s]
+    `tooth_angle` [rad]: immersion of tooth 1 at the first sample
+    `channels`: mapping of str to array, shape (n,)
     """
 
     spindle_speed: float
@@ -29,12 +26,8 @@ class SimulatedRecord:
 class SimulatedCut:
     """A cut and its air cut.
 
-    Parameters
-    ----------
-    id, tooling : str
-    records : mapping of ``cut`` and ``air`` to SimulatedRecord
-    force_lines : complex array, shape (m + 1, 2) [N]
-        True force by spindle order, F = Re sum_m lines[m] e^{i m angle of tooth 1}, X and Y.
+    `records`: mapping of ``cut`` and ``air`` to SimulatedRecord
+    `force_lines` [N], shape (m + 1, 2): true force by spindle order, F = Re sum_m lines[m] e^{i m angle of tooth 1}, X and Y
     """
 
     id: str
@@ -47,13 +40,8 @@ class SimulatedCut:
 class TrueReceptances:
     """Of one tooling on the machine at a spindle speed, from the full equations.
 
-    Parameters
-    ----------
-    tooling : str
-    spindle_speed : float [rad/s]
-    frequency_hz : array, shape (n,)
-    tip, cross : complex arrays, shape (n, 2, 2) [m/N]
-        Tip-tip and flange-tip: motion in X and Y, then force in X and Y.
+    `spindle_speed` [rad/s]; `frequency_hz`, shape (n,)
+    `tip`, `cross` [m/N], shape (n, 2, 2): tip-tip and flange-tip: motion in X and Y, then force in X and Y
     """
 
     tooling: str
@@ -67,11 +55,8 @@ class TrueReceptances:
 class TrueFlange:
     """The spindle's flange without a tooling.
 
-    Parameters
-    ----------
-    frequency_hz : array, shape (n,)
-    values : complex array, shape (n, 4, 4)
-        Translation and slope in X, then in Y, under force and moment in X, then in Y.
+    `frequency_hz`, shape (n,)
+    `values`, shape (n, 4, 4): translation and slope in X, then in Y, under force and moment in X, then in Y
     """
 
     frequency_hz: FloatArray

@@ -22,20 +22,12 @@ _HOUSING_CAPACITY, _TO_THE_AIR = 6.0, 4.0
 class Warming:
     """Bearings that lose stiffness as they warm up: each heats itself and gives its heat to the housing, and that gives it to the air.
 
-    Parameters
-    ----------
-    loss : float [-]
-        Share of the stiffness that the bearings lose from cold to warm at `REFERENCE_SPEED`; negative: gain.
-    time_constant : float [s]
-        Of a bearing against its housing.
-    exponent : float [-]
-        Of the speed in the heat of friction.
-    running, pause : float [s]
-        In which the spindle turns for each cut, its way in the air included, and stands after it.
-    warm_up : float [s]
-        For which it turns at the middle speed before each tooling's first cut.
-    shuffled : bool
-        Whether the speeds come in random order.
+    `loss` [-]: share of the stiffness that the bearings lose from cold to warm at `REFERENCE_SPEED`; negative: gain
+    `time_constant` [s]: of a bearing against its housing
+    `exponent` [-]: of the speed in the heat of friction
+    `running`, `pause` [s]: in which the spindle turns for each cut, its way in the air included, and stands after it
+    `warm_up` [s]: for which it turns at the middle speed before each tooling's first cut
+    `shuffled`: whether the speeds come in random order
     """
 
     loss: float
@@ -59,14 +51,9 @@ class Warming:
 class JointChanges:
     """A flange joint that is not the same in every cut: k = k0 e^c (1 - softening A / (A + amplitude)) with c new in each clamping.
 
-    Parameters
-    ----------
-    softening : float [-]
-        Share of the stiffness that large vibrations take.
-    amplitude : float [m]
-        Relative motion A of the faces at which half of that is lost.
-    reclamping : float [-]
-        Standard deviation of c.
+    `softening` [-]: share of the stiffness that large vibrations take
+    `amplitude` [m]: relative motion A of the faces at which half of that is lost
+    `reclamping` [-]: standard deviation of c
     """
 
     softening: float = 0.0
@@ -84,11 +71,8 @@ class JointChanges:
 class ChipLaw:
     """The force per width of cut, K h (h / thickness)^exponent: a curve where the campaign is told a straight line.
 
-    Parameters
-    ----------
-    exponent : float [-]
-    thickness : float [m]
-        Chip at which K is that of the workpiece's tangential coefficient.
+    `exponent` [-]
+    `thickness` [m]: chip at which K is that of the workpiece's tangential coefficient
     """
 
     exponent: float
@@ -118,14 +102,9 @@ class Changes:
 class Turn:
     """One cut in the course of a campaign.
 
-    Parameters
-    ----------
-    tooling, cut : int
-        Places in the campaign's toolings and in the plan's cuts.
-    started : float [s]
-        Since the campaign began.
-    warmth : tuple of float [-]
-        Of each bearing: 1 where it is as warm as it becomes at `REFERENCE_SPEED`.
+    `tooling`, `cut`: places in the campaign's toolings and in the plan's cuts
+    `started` [s]: since the campaign began
+    `warmth`: tuple of float [-], of each bearing: 1 where it is as warm as it becomes at `REFERENCE_SPEED`
     """
 
     tooling: int
@@ -137,15 +116,8 @@ class Turn:
 def course_of(plan: CutPlan, spindle: VirtualSpindle, changes: Changes, toolings: int, seed: int) -> list[Turn]:
     """Return a campaign's cuts in the order in which they are made, with the warmth of the bearings in each.
 
-    Parameters
-    ----------
-    plan : CutPlan
-    spindle : VirtualSpindle
-    changes : Changes
-    toolings : int
-        How many.
-    seed : int
-        Of the order of the speeds, where that is random.
+    `toolings`: how many
+    `seed`: of the order of the speeds, where that is random
     """
     warming, bearings = changes.warming, len(spindle.bearings)
     order = [np.arange(len(plan.cuts)) for _ in range(toolings)]
@@ -188,15 +160,8 @@ def _after(state: FloatArray, warming: Warming, speed: float, time: float) -> Fl
 def changed(spindle: VirtualSpindle, changes: Changes, turn: Turn, clamping: float, amplitude: float = 0.0) -> VirtualSpindle:
     """Return the spindle as it is in one cut.
 
-    Parameters
-    ----------
-    spindle : VirtualSpindle
-    changes : Changes
-    turn : Turn
-    clamping : float
-        Logarithm of the joint's stiffness over the drawn one, of this clamping.
-    amplitude : float [m]
-        Relative motion of the joint's faces.
+    `clamping`: logarithm of the joint's stiffness over the drawn one, of this clamping
+    `amplitude` [m]: relative motion of the joint's faces
     """
     bearings, joint = spindle.bearings, spindle.joint
     if changes.warming is not None:

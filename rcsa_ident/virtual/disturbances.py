@@ -23,23 +23,14 @@ _SMOOTH = 0.1
 class Disturbances:
     """What a workshop adds to the records of a virtual machine; nothing by default.
 
-    Parameters
-    ----------
-    speed_wander : float [-]
-        Standard deviation of the spindle speed within a record, as a share.
-    wander_time : float [s]
-        Correlation time of the speed.
-    clock_error : float [-]
-        By what share the recorder's clock runs fast: it takes that many more samples in a second than it says.
-    hum : float [m]
-        Amplitude of the mains' frequency in the gap sensors; its multiples come with it.
-    mains : float [Hz]
-    machine_noise : float [m/s^2]
-        Standard deviation of what the accelerometers feel of pumps, fans and bearings, most of it around 900 Hz.
-    knocks : float [1/s]
-        How often something knocks against the machine.
-    knock : float [m]
-        What the gap sensors see of a knock.
+    `speed_wander` [-]: standard deviation of the spindle speed within a record, as a share
+    `wander_time` [s]: correlation time of the speed
+    `clock_error` [-]: by what share the recorder's clock runs fast: it takes that many more samples in a second than it says
+    `hum` [m]: amplitude of the mains' frequency in the gap sensors; its multiples come with it
+    `mains` [Hz]
+    `machine_noise` [m/s^2]: standard deviation of what the accelerometers feel of pumps, fans and bearings, most of it around 900 Hz
+    `knocks` [1/s]: how often something knocks against the machine
+    `knock` [m]: what the gap sensors see of a knock
     """
 
     speed_wander: float = 0.0
@@ -75,19 +66,11 @@ def turning(
 ) -> FloatArray:
     """Return the spindle's angle at instants `step` apart, shape (count,) [rad].
 
-    Parameters
-    ----------
-    disturbances : Disturbances
-    speed : float [rad/s]
-        Mean of the process; that of a record lies beside it.
-    angle : float [rad]
-        At instant number `first`.
-    step : float [s]
-    count, first : int
-    rng : numpy.random.Generator
-        Not used by a spindle that does not wander.
-    acceleration : float [rad/s^2]
-        By which the speed changes from instant number `first` on.
+    `speed` [rad/s]: mean of the process; that of a record lies beside it
+    `angle` [rad]: at instant number `first`
+    `step` [s]
+    `rng`: not used by a spindle that does not wander
+    `acceleration` [rad/s^2]: by which the speed changes from instant number `first` on
     """
     from scipy.signal import lfilter  # slow to import, and files are read without it
 
@@ -114,16 +97,9 @@ def disturbed(
 ) -> tuple[FloatArray, FloatArray]:
     """Return what is added to the gap and to the accelerations of both axes, shapes (count, 2) [m], (count, 2 accelerometers) [m/s^2].
 
-    Parameters
-    ----------
-    disturbances : Disturbances
-    rate : float [Hz]
-        At which samples are truly taken.
-    count : int
-    rng : numpy.random.Generator
-        Not used where nothing disturbs.
-    accelerometers : int
-        Pairs of them: each feels the machine's noise for itself, and all the same knocks.
+    `rate` [Hz]: at which samples are truly taken
+    `rng`: not used where nothing disturbs
+    `accelerometers`: pairs of them: each feels the machine's noise for itself, and all the same knocks
     """
     from scipy.signal import lfilter
 

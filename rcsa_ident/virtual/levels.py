@@ -26,20 +26,12 @@ _INNERMOST = 0.01
 class Levels:
     """Pieces of edge, arrays of shape (teeth, levels).
 
-    Parameters
-    ----------
-    lag : [rad]
-        Of the piece's middle behind the tooth's tip.
-    offset : [m]
-        Radial, from the outline.
-    sine, cosine : [-]
-        Of the angle between the piece's outward normal and the axis pointing down.
-    width : [m]
-        In the plane of axis and radius.
-    entry, leave : [rad]
-        Immersion angles between which it is in the material.
-    spread : [rad]
-        From its lower to its upper end, along the helix.
+    `lag` [rad]: of the piece's middle behind the tooth's tip
+    `offset` [m]: radial, from the outline
+    `sine`, `cosine` [-]: of the angle between the piece's outward normal and the axis pointing down
+    `width` [m]: in the plane of axis and radius
+    `entry`, `leave` [rad]: immersion angles between which it is in the material
+    `spread` [rad]: from its lower to its upper end, along the helix
     """
 
     lag: FloatArray
@@ -61,17 +53,8 @@ class Levels:
 def levels_of(cutter: Cutter, conditions: CuttingConditions, count: int) -> Levels:
     """Return the levels of a cut, up to its depth.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    count : int
-        Levels, at least; of a shape those near the tip are lower, since it is widest open there.
-
-    Raises
-    ------
-    InputError
-        For a table of arcs, or a depth beyond the edge.
+    `count`: levels, at least; of a shape those near the tip are lower, since it is widest open there
+    Raises `InputError` for a table of arcs, or a depth beyond the edge.
     """
     depth = conditions.axial_depth
     if cutter.serration is not None:

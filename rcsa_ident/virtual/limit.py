@@ -31,15 +31,10 @@ _NEAR = 0.05
 class TrueLimit:
     """Where a cut loses stability.
 
-    Parameters
-    ----------
-    depth : float [m]
-        The smallest unstable depth; infinite where the cut is stable over the whole bracket.
-    multiplier : complex
-        By which the most persistent disturbance is multiplied per tooth period at that depth, of the pair the one above the
-        real axis; near -1 for a flip. NaN where `depth` is infinite.
-    marches : int
-        How many depths were simulated.
+    `depth` [m]: the smallest unstable depth; infinite where the cut is stable over the whole bracket
+    `multiplier`: by which the most persistent disturbance is multiplied per tooth period at that depth, of the pair the one above the real
+        axis; near -1 for a flip. NaN where `depth` is infinite.
+    `marches`: how many depths were simulated
     """
 
     depth: float
@@ -58,26 +53,13 @@ def true_limit(
 ) -> TrueLimit:
     """Return the smallest depth in the bracket at which a small disturbance of the steady cut no longer dies away.
 
-    Parameters
-    ----------
-    dynamics : Poles
-        The machine at the cut's speed, with inputs ``tip.x``, ``tip.y``.
-    cutter : Cutter
-        One with equal teeth.
-    conditions : CuttingConditions
-        Depth and feed are left aside.
-    coefficients : CuttingCoefficients
-    bracket : (float, float) [m]
-        The cut has to be stable at the first; depths up to the second are looked at.
-    tolerance : float
-        Relative error of the depth that is allowed.
-    step : float [s]
-        See `multiplier`.
-
-    Raises
-    ------
-    InputError
-        If the cut is unstable at the bracket's first depth.
+    `dynamics`: the machine at the cut's speed, with inputs ``tip.x``, ``tip.y``
+    `cutter`: one with equal teeth
+    `conditions`: depth and feed are left aside
+    `bracket`: (float, float) [m]; the cut has to be stable at the first; depths up to the second are looked at
+    `tolerance`: relative error of the depth that is allowed
+    `step` [s]: see `multiplier`
+    Raises `InputError` if the cut is unstable at the bracket's first depth.
     """
     low, high = (positive(f"bracket[{i}]", value, "m") for i, value in enumerate(bracket))
     if not low < high:
@@ -124,16 +106,9 @@ def multiplier(
     of steps. The largest eigenvalue of the march over one tooth period is found by Arnoldi's method
     [arnoldi1951].
 
-    Parameters
-    ----------
-    dynamics : Poles
-        At the cut's speed, with inputs ``tip.x``, ``tip.y``.
-    cutter : Cutter
-        With equal teeth.
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
-    step : float [s]
-        Longest step of the march; the error falls with its square.
+    `dynamics`: at the cut's speed, with inputs ``tip.x``, ``tip.y``
+    `cutter`: with equal teeth
+    `step` [s]: longest step of the march; the error falls with its square
     """
     return _Disturbance(dynamics, cutter, conditions, coefficients, step).multiplier(conditions.axial_depth)
 
@@ -253,14 +228,8 @@ def directional_matrices(cutter: Cutter, conditions: CuttingConditions, coeffici
 
     Each is the mean over the depth, along the helix, and over the step around its instant, in closed form.
 
-    Parameters
-    ----------
-    cutter : Cutter
-        With equal teeth.
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
-    count : int
-        Instants in a tooth period.
+    `cutter`: with equal teeth
+    `count`: instants in a tooth period
     """
     pitch = 2.0 * np.pi / cutter.teeth
     entry, leave = same_everywhere(conditions.engagement).angles

@@ -19,18 +19,11 @@ PerAxis = tuple[float, float]
 class Bearing:
     """A radial spring and damper between shaft and housing.
 
-    Parameters
-    ----------
-    position : float [m]
-        Distance from the spindle's flange face towards the rear.
-    stiffness : two floats [N/m]
-        Stiffness at standstill along the two principal directions, X and Y where these are not turned.
-    damping : two floats [N s/m]
-        Along the same.
-    softening : float [s/rad], default 0
-        Share of the stiffness lost per spindle speed: k = k0 (1 - softening Omega).
-    angle : float [rad], default 0
-        Of the principal directions about the spindle's axis, from +X towards +Y.
+    `position` [m]: distance from the spindle's flange face towards the rear
+    `stiffness`: two floats [N/m], stiffness at standstill along the two principal directions, X and Y where these are not turned
+    `damping`: two floats [N s/m], along the same
+    `softening` [s/rad], default 0: share of the stiffness lost per spindle speed: k = k0 (1 - softening Omega)
+    `angle` [rad], default 0: of the principal directions about the spindle's axis, from +X towards +Y
     """
 
     position: float
@@ -52,18 +45,11 @@ class Bearing:
 class Housing:
     """A rigid body, on springs and dampers to the ground.
 
-    Parameters
-    ----------
-    position : float [m]
-        Of its centre of mass and of its support, from the flange face towards the rear.
-    mass : float [kg]
-    inertia : float [kg m^2]
-    stiffness, damping : two floats [N/m], [N s/m]
-        Along the two principal directions, X and Y where these are not turned.
-    tilting_stiffness, tilting_damping : two floats [N m/rad], [N m s/rad]
-        In the planes of the same.
-    angle : float [rad], default 0
-        Of the principal directions about the spindle's axis, from +X towards +Y.
+    `position` [m]: of its centre of mass and of its support, from the flange face towards the rear
+    `mass` [kg]; `inertia` [kg m^2]
+    `stiffness`, `damping`: two floats [N/m], [N s/m]; along the two principal directions, X and Y where these are not turned
+    `tilting_stiffness`, `tilting_damping`: two floats [N m/rad], [N m s/rad]; in the planes of the same
+    `angle` [rad], default 0: of the principal directions about the spindle's axis, from +X towards +Y
     """
 
     position: float
@@ -89,12 +75,7 @@ class Housing:
 class FlangeJoint:
     """The clamped face between spindle and holder, lumped.
 
-    Parameters
-    ----------
-    translational_stiffness : float [N/m]
-    translational_damping : float [N s/m]
-    rotational_stiffness : float [N m/rad]
-    rotational_damping : float [N m s/rad]
+    `translational_stiffness` [N/m]; `translational_damping` [N s/m]; `rotational_stiffness` [N m/rad]; `rotational_damping` [N m s/rad]
     """
 
     translational_stiffness: float
@@ -113,21 +94,12 @@ class FlangeJoint:
 class VirtualSpindle:
     """A spindle in its housing, as far as the flange face.
 
-    Parameters
-    ----------
-    shaft : tuple of BeamSegment
-        Segments from the flange face to the rear end.
-    bearings : tuple of Bearing
-    housing : Housing
-    joint : FlangeJoint
-    gyroscopic : bool, default True
-        Whether the moments of the spinning parts couple the two bending planes, as those of every real spindle do.
-    fixture_position : float [m]
-        Where on the housing the flange sensor is held, from the flange face towards the rear.
-    housing_positions : tuple of float [m]
-        Where on it further accelerometers stand, a pair for X and Y at each.
-    seen_at : float [m]
-        Where the flange sensors look, from the flange face towards the rear; negative: on the holder.
+    `shaft`: segments from the flange face to the rear end
+    `gyroscopic`: bool, default True; whether the moments of the spinning parts couple the two bending planes, as those of every real
+        spindle do
+    `fixture_position` [m]: where on the housing the flange sensor is held, from the flange face towards the rear
+    `housing_positions`: tuple of float [m], where on it further accelerometers stand, a pair for X and Y at each
+    `seen_at` [m]: where the flange sensors look, from the flange face towards the rear; negative: on the holder
     """
 
     shaft: tuple[BeamSegment, ...]
@@ -183,24 +155,15 @@ def _angle(field: str, value: float) -> None:
 class CutPlan:
     """The cuts of a simulated campaign: every tooling at every speed, and in every pass.
 
-    Parameters
-    ----------
-    spindle_speeds : tuple of float [rad/s]
-        Programmed speeds of the cuts at one speed; none where there are passes.
-    axial_depth, feed_per_tooth : float [m]
-    engagement : Engagement
-    feed_angle : float [rad]
-        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
-    duration : float [s]
-        Length of each record.
-    settling : float [s]
-        Time that is simulated before it and dropped.
-    entry, leave : float [s]
-        Of the record, in the air and while the depth rises and falls again, half each; 0 where all of it is in the material.
-    passes : tuple of (float, float) [rad/s]
-        Programmed first and last speed of passes whose speed changes evenly in time.
-    pass_duration : float [s]
-        Length of the record of each.
+    `spindle_speeds`: tuple of float [rad/s], programmed speeds of the cuts at one speed; none where there are passes
+    `axial_depth`, `feed_per_tooth` [m]
+    `feed_angle` [rad]: direction of the feed in the machine's X-Y plane, from +X towards +Y
+    `duration` [s]: length of each record
+    `settling` [s]: time that is simulated before it and dropped
+    `entry`, `leave` [s]: of the record, in the air and while the depth rises and falls again, half each; 0 where all of it is in the
+        material
+    `passes`: tuple of (float, float) [rad/s]; programmed first and last speed of passes whose speed changes evenly in time
+    `pass_duration` [s]: length of the record of each
     """
 
     spindle_speeds: tuple[float, ...]

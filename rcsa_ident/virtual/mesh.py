@@ -63,15 +63,9 @@ class Mesh:
     def body(self, number: int, origin: float, segments: tuple[BeamSegment, ...], keys: list[int]) -> None:
         """Mesh one body with nodes at `keys`, which hold all its steps.
 
-        Parameters
-        ----------
-        number : int
-            The body's.
-        origin : float [m]
-            Position of its first segment's start.
-        segments : tuple of BeamSegment
-        keys : list of int [nm]
-            Positions of its nodes.
+        `number`: the body's
+        `origin` [m]: position of its first segment's start
+        `keys`: list of int [nm], positions of its nodes
         """
         for a, b in itertools.pairwise(keys):
             start, end = a * 1e-9, b * 1e-9
@@ -100,15 +94,9 @@ class Mesh:
 def element_edges(origin: float, segments: tuple[BeamSegment, ...], stops: list[int], refinement: int) -> list[int]:
     """Return node positions [nm] with every step and stop among them, evenly spaced between.
 
-    Parameters
-    ----------
-    origin : float [m]
-        Position of the first segment's start.
-    segments : tuple of BeamSegment
-    stops : list of int [nm]
-        Further positions that get a node.
-    refinement : int
-        Divides every element further.
+    `origin` [m]: position of the first segment's start
+    `stops`: list of int [nm], further positions that get a node
+    `refinement`: divides every element further
     """
     keys: list[int] = []
     start = origin
@@ -136,13 +124,8 @@ def _piece(origin: float, segments: tuple[BeamSegment, ...], start: float, end: 
 def add_tooling(mesh: Mesh, tooling: ToolAssembly, refinement: int) -> None:
     """Add tool and holder to a mesh: two parallel beams over the insertion, tied by the distributed contact or sharing their nodes.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Gets the elements.
-    tooling : ToolAssembly
-    refinement : int
-        Divides every element further.
+    `mesh`: gets the elements
+    `refinement`: divides every element further
     """
     face, depth = nanometres(tooling.stickout), nanometres(tooling.tool_length)
     if not tooling.holder:

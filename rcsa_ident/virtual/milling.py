@@ -27,14 +27,9 @@ _START_ORDERS = 512
 class Course:
     """How a cut goes on, instant by instant.
 
-    Parameters
-    ----------
-    angle : array, shape (n,) [rad]
-        Immersion angle of tooth 1, growing, by less than the angle between two teeth each.
-    way : array, shape (n,) [m]
-        Of the tool along the feed.
-    width : array, shape (n,) [-]
-        Share of the axial depth that is in the material: it rises at the entry and falls at the exit.
+    `angle` [rad], shape (n,): immersion angle of tooth 1, growing, by less than the angle between two teeth each
+    `way` [m], shape (n,): of the tool along the feed
+    `width` [-], shape (n,): share of the axial depth that is in the material: it rises at the entry and falls at the exit
     """
 
     angle: FloatArray
@@ -46,20 +41,14 @@ class Course:
 class CutHistory:
     """One simulated cut.
 
-    Parameters
-    ----------
-    step : float [s]
-    angle : array, shape (n,) [rad]
-        Immersion angle of tooth 1 at the tip, from the feed's normal, growing.
-    force : array, shape (n, 2) [N]
-        Force on the tool, machine axes X and Y.
-    tip, flange, fixture : arrays, shape (n, 2) [m]
-        Absolute displacements, X and Y; the tip's is relative to the workpiece where that gives way, too, and the flange's is seen where
-        its sensors look.
-    acceleration : array, shape (n, 2 + 2 h) [m/s^2]
-        Acceleration of the fixture, then of each of h further points, of the housing and last of the workpiece, X and Y.
-    axial : array, shape (n,) [N]
-        Force on the tool along z, from the tip to the spindle; a machine without that input is rigid that way.
+    `step` [s]
+    `angle` [rad], shape (n,): immersion angle of tooth 1 at the tip, from the feed's normal, growing
+    `force` [N], shape (n, 2): force on the tool, machine axes X and Y
+    `tip`, `flange`, `fixture` [m], shape (n, 2): absolute displacements, X and Y; the tip's is relative to the workpiece where that gives
+        way, too, and the flange's is seen where its sensors look
+    `acceleration` [m/s^2], shape (n, 2 + 2 h): acceleration of the fixture, then of each of h further points, of the housing and last of
+        the workpiece, X and Y
+    `axial` [N], shape (n,): force on the tool along z, from the tip to the spindle; a machine without that input is rigid that way
     """
 
     step: float
@@ -178,17 +167,9 @@ def rigid_force_lines(
 
     Tooth 1 is at immersion 0 when t = 0; machine axes, and z towards the spindle.
 
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-    coefficients : CuttingCoefficients
-    slices : int
-        Levels of the depth, for helix and shape.
-    samples : int
-        Instants of a revolution.
-    law : ChipLaw, optional
-        As in `mill_cut`.
+    `slices`: levels of the depth, for helix and shape
+    `samples`: instants of a revolution
+    `law`: as in `mill_cut`
     """
     step = 2.0 * np.pi / conditions.spindle_speed / samples
     teeth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, law)
@@ -241,13 +222,9 @@ def synchronous_lines(angle: FloatArray, values: FloatArray, orders: int) -> np.
 
     values = Re sum_m lines[m] e^{i m angle}; over the last whole revolutions.
 
-    Parameters
-    ----------
-    angle : array, shape (n,) [rad]
-        Growing evenly.
-    values : array, shape (n, c)
-    orders : int
-        Number of spindle orders, 0 among them.
+    `angle` [rad], shape (n,): growing evenly
+    `values`, shape (n, c)
+    `orders`: number of spindle orders, 0 among them
     """
     turn = 2.0 * np.pi
     first, last = np.ceil(angle[0] / turn), np.floor(angle[-1] / turn)

@@ -24,12 +24,9 @@ _OVERDAMPED = 0.03
 class ReducedRotor:
     """The rotor in fewer coordinates, orthonormal with its mass.
 
-    Parameters
-    ----------
-    damping, stiffness, loss, gyroscopic, softening : arrays, shape (m, m)
-        The mass is the identity.
-    ports : array, shape (p, m)
-    coordinates : tuple of Coordinate, length p
+    `damping`, `stiffness`, `loss`, `gyroscopic`, `softening`, shape (m, m): the mass is the identity
+    `ports`, shape (p, m)
+    `coordinates`: tuple of Coordinate, length p
     """
 
     damping: FloatArray
@@ -50,17 +47,11 @@ def reduced(
 ) -> ReducedRotor:
     """Return the rotor on its undamped modes up to `max_frequency` [Hz] and its damped motion under forces at `inputs`.
 
-    Parameters
-    ----------
-    model : Rotor
-    max_frequency : float [Hz]
-    inputs : tuple of str
-        Coordinates such as ``tip.x`` at which forces act.
-    exact_at : tuple of float [Hz]
-        Frequencies at which the full solutions, real and imaginary parts apart, join the basis: dampers that act in one
-        place, as in the tool's clamping, excite shapes that no low undamped mode has.
-    planes : int
-        Equal parts of the freedoms between which there is no mass: X and Y; 1 of a rotor on a robot.
+    `max_frequency` [Hz]
+    `inputs`: coordinates such as ``tip.x`` at which forces act
+    `exact_at`: tuple of float [Hz], frequencies at which the full solutions, real and imaginary parts apart, join the basis: dampers that
+        act in one place, as in the tool's clamping, excite shapes that no low undamped mode has
+    `planes`: equal parts of the freedoms between which there is no mass: X and Y; 1 of a rotor on a robot
     """
     d = model.mass.shape[0]
     size = d // planes
@@ -102,13 +93,9 @@ def reduced(
 class Poles:
     """A real linear system: q' = pole q + inputs F, w = 2 Re(outputs q).
 
-    Parameters
-    ----------
-    pole : complex array, shape (m,) [rad/s]
-        Those with positive imaginary part; real ones of overdamped modes, with half their residue.
-    inputs : complex array, shape (m, i)
-    outputs : complex array, shape (p, m)
-    coordinates : tuple of Coordinate, length p
+    `pole` [rad/s], shape (m,): those with positive imaginary part; real ones of overdamped modes, with half their residue
+    `inputs`, shape (m, i); `outputs`, shape (p, m)
+    `coordinates`: tuple of Coordinate, length p
     """
 
     pole: ComplexArray
@@ -132,13 +119,8 @@ def poles(model: ReducedRotor, speed: float = 0.0, inputs: tuple[str, ...] = ("t
     real, causal system; it differs from the hysteretic one by a share of the loss factor far from resonance
     (`tests/virtual/test_reduction.py` holds it below 0.2 %).
 
-    Parameters
-    ----------
-    model : ReducedRotor
-    speed : float [rad/s]
-        Spindle speed.
-    inputs : tuple of str
-        Coordinates at which forces act.
+    `speed` [rad/s]: spindle speed
+    `inputs`: coordinates at which forces act
     """
     m = model.stiffness.shape[0]
     state = np.zeros((2 * m, 2 * m), dtype=complex)
@@ -166,10 +148,7 @@ def alike(first: Poles, other: Poles) -> Poles:
     The state of a march may then go on from one to the other: what the slow change of the shapes themselves would add to it is of the
     order of that change within one period of a mode.
 
-    Raises
-    ------
-    InputError
-        If the machine does not have as many poles of its own.
+    Raises `InputError` if the machine does not have as many poles of its own.
     """
     if other.pole.size != first.pole.size:
         raise InputError("dynamics", f"{other.pole.size} poles", f"{first.pole.size}, as many as before")

@@ -23,13 +23,9 @@ from rcsa_ident.virtual.rotor import Rotor, rotor, turned
 class VirtualRobot:
     """An arm and the spindle in its hand.
 
-    Parameters
-    ----------
-    arm : RobotModel
-        Its payload is all of the spindle that does not turn.
-    spindle : VirtualSpindle
-        Shaft, bearings and joint. Its housing is the arm's payload: of the housing here only the place counts, from which the bearings are
-        measured.
+    `arm`: its payload is all of the spindle that does not turn
+    `spindle`: shaft, bearings and joint. Its housing is the arm's payload: of the housing here only the place counts, from which the
+        bearings are measured.
     """
 
     arm: RobotModel
@@ -107,10 +103,7 @@ def arm_matrices(arm: RobotModel, posture: FloatArray) -> tuple[FloatArray, Floa
     The hand is where the tool-holder's flange sits, in the spindle's axes (z from the tip into the spindle): translation and slope in X, in
     Y, translation along Z, turn about it. A slope in X is a turn about y, one in Y a turn about -x.
 
-    Parameters
-    ----------
-    arm : RobotModel
-    posture : array, shape (j,) [rad]
+    `posture` [rad], shape (j,)
     """
     axes, places, bodies, springs, dampers = [], [], [], [], []
     here = Frame()

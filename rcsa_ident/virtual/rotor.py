@@ -27,15 +27,11 @@ _SLOPES = (Dof.SLOPE_X, Dof.SLOPE_Y)
 class Rotor:
     """M q'' + (C + Omega G) q' + (K - Omega K_s + i S) q = f; X freedoms first, then Y.
 
-    Parameters
-    ----------
-    mass, damping, stiffness, loss, gyroscopic, softening : sparse matrices, shape (d, d)
-        `loss` is S, the materials' hysteretic part; `gyroscopic` G and `softening` K_s are per spindle speed.
-    ports : array, shape (p, d)
-        Motion at each coordinate as a combination of the freedoms; its transpose spreads a force.
-    coordinates : tuple of Coordinate, length p
-        ``tip`` (cutting end), ``flange`` (spindle side of the joint), ``seen`` (where the flange sensors look, if not there),
-        ``fixture`` (sensor holder on the housing).
+    `mass`, `damping`, `stiffness`, `loss`, `gyroscopic`, `softening`: sparse matrices, shape (d, d); `loss` is S, the materials' hysteretic
+        part; `gyroscopic` G and `softening` K_s are per spindle speed
+    `ports`, shape (p, d): motion at each coordinate as a combination of the freedoms; its transpose spreads a force
+    `coordinates`: tuple of Coordinate, length p; ``tip`` (cutting end), ``flange`` (spindle side of the joint), ``seen`` (where the flange
+        sensors look, if not there), ``fixture`` (sensor holder on the housing)
     """
 
     mass: scipy.sparse.csc_array
@@ -59,15 +55,9 @@ class Rotor:
 def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int = 1, points: Mapping[str, float] | None = None) -> Rotor:
     """Return the assembled rotor; without a tooling, the spindle alone with its flange free.
 
-    Parameters
-    ----------
-    spindle : VirtualSpindle
-    tooling : ToolAssembly or None
-        None is the bare spindle.
-    refinement : int
-        Divides every element further: for convergence studies.
-    points : mapping of str to float [m], optional
-        Further ports on the holder, by their distance from the tip: the nearest node's.
+    `tooling`: None is the bare spindle
+    `refinement`: divides every element further: for convergence studies
+    `points`: mapping of str to float [m]; further ports on the holder, by their distance from the tip: the nearest node's
     """
     mesh = Mesh()
     if tooling is not None:
@@ -131,18 +121,10 @@ def frequency_response(
 ) -> ComplexArray:
     """Return the receptances from `inputs` to `outputs` by solving the full equations at every frequency.
 
-    Parameters
-    ----------
-    model : Rotor
-    omega : array, shape (n,) [rad/s], above 0
-    speed : float [rad/s]
-        Spindle speed, for gyroscopic moments and softening.
-    inputs, outputs : tuples of str
-        Coordinates such as ``tip.x``; outputs default to all.
-
-    Returns
-    -------
-    complex array, shape (n, outputs, inputs) [m/N]
+    `omega`: array, shape (n,) [rad/s], above 0
+    `speed` [rad/s]: spindle speed, for gyroscopic moments and softening
+    `inputs`, `outputs`: coordinates such as ``tip.x``; outputs default to all
+    Returns a complex array of shape (n, outputs, inputs) [m/N].
     """
     rows = np.arange(len(model.coordinates)) if outputs is None else model.port(*outputs)
     return model.ports[rows] @ frequency_motion(model, omega, inputs, speed)
@@ -151,14 +133,9 @@ def frequency_response(
 def frequency_motion(model: Rotor, omega: FloatArray, inputs: tuple[str, ...], speed: float = 0.0) -> ComplexArray:
     """Return the motion of every freedom under unit forces at `inputs`, shape (n, d, inputs).
 
-    Parameters
-    ----------
-    model : Rotor
-    omega : array, shape (n,) [rad/s], above 0
-    inputs : tuple of str
-        Coordinates such as ``tip.x``.
-    speed : float [rad/s]
-        Spindle speed.
+    `omega`: array, shape (n,) [rad/s], above 0
+    `inputs`: coordinates such as ``tip.x``
+    `speed` [rad/s]: spindle speed
     """
     omega = np.asarray(omega, dtype=float)
     force = np.ascontiguousarray(model.ports[model.port(*inputs)].T.astype(complex))
@@ -174,12 +151,8 @@ def frequency_motion(model: Rotor, omega: FloatArray, inputs: tuple[str, ...], s
 def turned(values: PerAxis, angle: float) -> FloatArray:
     """Return T diag(values) T^T with T = [[cos, -sin], [sin, cos]] of the angle, shape (2, 2), along the machine's X and Y.
 
-    Parameters
-    ----------
-    values : two floats
-        Along the first and the second principal direction.
-    angle : float [rad]
-        Of the first principal direction, from +X towards +Y; at 0 the diagonal is `values` to the last bit.
+    `values`: two floats, along the first and the second principal direction
+    `angle` [rad]: of the first principal direction, from +X towards +Y; at 0 the diagonal is `values` to the last bit
     """
     c, s = float(np.cos(angle)), float(np.sin(angle))
     first, second = values

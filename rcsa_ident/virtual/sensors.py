@@ -19,30 +19,19 @@ UNDISTURBED = Disturbances()
 class SensorSuite:
     """The sensors of a virtual machine and their imperfections.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    gap_noise : float [m]
-        Standard deviation of a sample.
-    gap_drift : float [m]
-        Size of the slow wandering within a record.
-    acceleration_noise : float [m/s^2]
-    roundness : float [m]
-        Sum of the amplitudes of the flange's out-of-roundness and run-out.
-    roundness_orders : int
-        Spindle orders 1 to this.
-    cutter_runout : float [m]
-        Eccentricity of the cutter in its clamping.
-    speed_error : float [-]
-        Standard deviation of the true speed's relative deviation from the programmed one, new in every record.
-    trigger : bool
-        Whether there is a pulse once per revolution.
-    tooth_angle : float [rad]
-        Immersion angle of tooth 1 at the trigger's edge.
-    gap_sensitivity, acceleration_sensitivity : float [V/m], [V/(m/s^2)]
-    gap_delay, acceleration_delay : float [s]
-    gap_bandwidth, acceleration_bandwidth : float or None [Hz]
-        First-order low-pass.
+    `rate` [Hz]
+    `gap_noise` [m]: standard deviation of a sample
+    `gap_drift` [m]: size of the slow wandering within a record
+    `acceleration_noise` [m/s^2]
+    `roundness` [m]: sum of the amplitudes of the flange's out-of-roundness and run-out
+    `roundness_orders`: spindle orders 1 to this
+    `cutter_runout` [m]: eccentricity of the cutter in its clamping
+    `speed_error` [-]: standard deviation of the true speed's relative deviation from the programmed one, new in every record
+    `trigger`: whether there is a pulse once per revolution
+    `tooth_angle` [rad]: immersion angle of tooth 1 at the trigger's edge
+    `gap_sensitivity`, `acceleration_sensitivity`: float [V/m], [V/(m/s^2)]
+    `gap_delay`, `acceleration_delay` [s]
+    `gap_bandwidth`, `acceleration_bandwidth` [Hz]: first-order low-pass
     """
 
     rate: float = 25600.0
@@ -82,12 +71,8 @@ class SensorSuite:
 class Clamping:
     """What is fixed in the rotating frame as long as a tooling stays clamped.
 
-    Parameters
-    ----------
-    roundness : complex array, shape (orders,) [m]
-        Amplitude of each order of the flange's outer surface, in the angle from tooth 1.
-    runout : array, shape (teeth,) [m]
-        Radial offset of each edge.
+    `roundness`: complex array, shape (orders,) [m]; amplitude of each order of the flange's outer surface, in the angle from tooth 1
+    `runout` [m], shape (teeth,): radial offset of each edge
     """
 
     roundness: np.ndarray
@@ -97,12 +82,7 @@ class Clamping:
 def clamp(suite: SensorSuite, tooth_angle: FloatArray, rng: np.random.Generator) -> Clamping:
     """Draw a clamping: amplitudes that fall with the order, any phases, an eccentric cutter.
 
-    Parameters
-    ----------
-    suite : SensorSuite
-    tooth_angle : array, shape (teeth,) [rad]
-        Angle of each tooth ahead of tooth 1.
-    rng : numpy.random.Generator
+    `tooth_angle` [rad], shape (teeth,): angle of each tooth ahead of tooth 1
     """
     order = np.arange(1, suite.roundness_orders + 1)
     size = rng.uniform(0.5, 1.5, order.size) / order
@@ -115,15 +95,9 @@ def clamp(suite: SensorSuite, tooth_angle: FloatArray, rng: np.random.Generator)
 def out_of_round(suite: SensorSuite, clamping: Clamping, angle: FloatArray, speed: float, factor: int) -> FloatArray:
     """Return what the gap sensors in +X and +Y record of the turning flange's surface, shape (n, 2) [m].
 
-    Parameters
-    ----------
-    suite : SensorSuite
-    clamping : Clamping
-    angle : array, shape (n,) [rad]
-        Angle of tooth 1 at each sample, clockwise from +Y to +X.
-    speed : float [rad/s]
-    factor : int
-        Fine instants per sample; the `decimator`'s flatness at each order is exact here.
+    `angle` [rad], shape (n,): angle of tooth 1 at each sample, clockwise from +Y to +X
+    `speed` [rad/s]
+    `factor`: fine instants per sample; the `decimator`'s flatness at each order is exact here
     """
     order = np.arange(1, clamping.roundness.size + 1)
     omega = order * speed
@@ -165,21 +139,12 @@ def padding(factor: int) -> int:
 def sample(values: FloatArray, factor: int, fine_step: float, delay: float, bandwidth: float | None) -> FloatArray:
     """Return a channel at the record's rate: sensor lag, anti-alias filter, every `factor`-th sample.
 
-    Parameters
-    ----------
-    values : array, shape (factor * (n - 1 + 2 pad) + 1,)
-        With `padding` on both sides; the delay may not exceed the padding by much.
-    factor : int
-        Fine instants per sample.
-    fine_step : float [s]
-    delay : float [s]
-        The sensor lags by it.
-    bandwidth : float or None [Hz]
-        Of the sensor's first-order low-pass.
-
-    Returns
-    -------
-    array, shape (n,)
+    `values`: array, shape (factor * (n - 1 + 2 pad) + 1,); with `padding` on both sides; the delay may not exceed the padding by much
+    `factor`: fine instants per sample
+    `fine_step` [s]
+    `delay` [s]: the sensor lags by it
+    `bandwidth` [Hz]: of the sensor's first-order low-pass
+    Returns an array of shape (n,).
     """
     from scipy.signal import lfilter, upfirdn
 
@@ -208,14 +173,7 @@ def _delayed(taps: FloatArray, shift: float) -> FloatArray:
 
 
 def drift(size: float, count: int, rng: np.random.Generator) -> FloatArray:
-    """Return a slow wandering: a line and half a wave across the record, shape (count,).
-
-    Parameters
-    ----------
-    size : float [m]
-    count : int
-    rng : numpy.random.Generator
-    """
+    """Return a slow wandering: a line and half a wave across the record, shape (count,). `size` [m]."""
     s = np.linspace(-0.5, 0.5, count)
     a, b, phase = rng.normal(), rng.normal(), rng.uniform(0.0, 2.0 * np.pi)
     return size * (a * s + 0.3 * b * np.sin(np.pi * s + phase))
@@ -224,13 +182,9 @@ def drift(size: float, count: int, rng: np.random.Generator) -> FloatArray:
 def trigger_pulse(angle: FloatArray, edge: float, width: float = 0.35) -> FloatArray:
     """Return 1 while the reference mark passes, else 0; the edge rises where the tooth angle passes `edge`.
 
-    Parameters
-    ----------
-    angle : array, shape (n,) [rad]
-        Angle of tooth 1.
-    edge : float [rad]
-        Tooth angle at which the pulse rises.
-    width : float [rad]
+    `angle` [rad], shape (n,): angle of tooth 1
+    `edge` [rad]: tooth angle at which the pulse rises
+    `width` [rad]
     """
     return (np.mod(angle - edge, 2.0 * np.pi) < width).astype(float)
 
@@ -255,23 +209,13 @@ def record(
 ) -> dict[str, FloatArray]:
     """Return the channels of one record, in the sensors' signal units, shape (count,) each.
 
-    Parameters
-    ----------
-    suite : SensorSuite
-        Its rate is that at which samples are truly taken.
-    clamping : Clamping
-    angle : array, shape (count,) [rad]
-        Immersion angle of tooth 1 at each sample.
-    feed_angle : float [rad]
-    factor : int
-        Fine instants per sample.
-    history : CutHistory or None
-        The simulated cut with `padding` on both sides; None is an air cut.
-    rng : numpy.random.Generator
-    disturbances : Disturbances
-        What is added; how the spindle turns is in the angle.
-    places : tuple of str
-        Of the pairs of accelerometers (`accelerometer_places`); each is as that on the sensors' fixture.
+    `suite`: its rate is that at which samples are truly taken
+    `angle` [rad], shape (count,): immersion angle of tooth 1 at each sample
+    `feed_angle` [rad]
+    `factor`: fine instants per sample
+    `history`: the simulated cut with `padding` on both sides; None is an air cut
+    `disturbances`: what is added; how the spindle turns is in the angle
+    `places`: of the pairs of accelerometers (`accelerometer_places`); each is as that on the sensors' fixture
     """
     count = angle.size
     speed = float(angle[-1] - angle[0]) / (count - 1) * suite.rate

@@ -21,13 +21,9 @@ ROLES = ("table", "workpiece")
 class SideMode:
     """A spring, a mass and a damper under the workpiece.
 
-    Parameters
-    ----------
-    natural_frequency : float [rad/s]
-        Undamped.
-    damping_ratio : float [-]
-        Below 1.
-    stiffness : float [N/m]
+    `natural_frequency` [rad/s]: undamped
+    `damping_ratio` [-]: below 1
+    `stiffness` [N/m]
     """
 
     natural_frequency: float
@@ -45,12 +41,8 @@ class SideMode:
 class VirtualWorkpieceSide:
     """Modes of the workpiece's side along each machine axis; X and Y feel nothing of each other.
 
-    Parameters
-    ----------
-    x, y : tuple of SideMode
-        None where it is rigid.
-    role : str
-        What the pair of accelerometers is fixed to, ``table`` or ``workpiece``; it moves with the workpiece all the same.
+    `x`, `y`: None where it is rigid
+    `role`: what the pair of accelerometers is fixed to, ``table`` or ``workpiece``; it moves with the workpiece all the same
     """
 
     x: tuple[SideMode, ...]
@@ -64,14 +56,8 @@ class VirtualWorkpieceSide:
     def receptance(self, omega: FloatArray) -> ComplexArray:
         """Return what the workpiece gives way under a force on it: the sum of 1 / k_n / (1 - r_n^2 + 2 i zeta_n r_n), r_n = w / w_n.
 
-        Parameters
-        ----------
-        omega : array, shape (n,) [rad/s]
-
-        Returns
-        -------
-        complex array, shape (n, 2, 2) [m/N]
-            Motion in X and Y, then force in X and Y.
+        `omega` [rad/s], shape (n,)
+        Returns a complex array of shape (n, 2, 2) [m/N]: motion in X and Y, then force in X and Y.
         """
         found = np.zeros((np.size(omega), 2, 2), dtype=complex)
         for i, modes in enumerate((self.x, self.y)):
@@ -84,10 +70,7 @@ class VirtualWorkpieceSide:
         """Return the machine with the workpiece's side: ``tip`` is then the tool's motion relative to the workpiece, which is what a chip
         feels, and ``workpiece`` moves as the reaction of the force on the tool moves it.
 
-        Parameters
-        ----------
-        machine : Poles
-            With inputs ``tip.x``, ``tip.y``.
+        `machine`: with inputs ``tip.x``, ``tip.y``
         """
         axes = [i for i, modes in enumerate((self.x, self.y)) for _ in modes]
         modes = (*self.x, *self.y)

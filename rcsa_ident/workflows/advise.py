@@ -59,19 +59,11 @@ def advise(
 
     The recommended cuts do not depend on the method of the limits beside them.
 
-    Parameters
-    ----------
-    change : ToolChange
-    drive : SpindleDrive
-        What the spindle has; without a feed per tooth its power and torque cannot be asked.
-    tolerance, probability, reserve : float
-        What a recommendation holds back: see `StabilityLobes.recommended_depth`.
-    depth : float or None [m]
-        At which speeds may one cut so deep?
-    planned : sequence of (speed [rad/s], depth [m])
-        How far are these cuts from chatter?
-    tested : TestedCuts or None
-        Cuts that were tried: how many do the limits tell right?
+    `drive`: what the spindle has; without a feed per tooth its power and torque cannot be asked
+    `tolerance`, `probability`, `reserve`: what a recommendation holds back: see `StabilityLobes.recommended_depth`
+    `depth` [m]: at which speeds may one cut so deep?
+    `planned`: sequence of (speed [rad/s], depth [m]); how far are these cuts from chatter?
+    `tested`: cuts that were tried: how many do the limits tell right?
     """
     process, shares, asked = change.process, _Shares(tolerance, probability, reserve), change
     SEARCHED_DEPTH.checked("max_depth", change.max_depth)

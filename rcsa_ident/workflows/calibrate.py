@@ -38,15 +38,9 @@ ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
 class MeasuredForce:
     """What one recording says about the cutting force.
 
-    Parameters
-    ----------
-    cut_id : str
-    record : ForceRecord
-        Lines of the forces, as the sensors are told or as `force_axes` found them.
-    duration : float [s]
-        Of the steady part.
-    zeroed : bool
-        Whether the sensors' zero is known, from the air cut or from stretches in which nothing is cut.
+    `record`: lines of the forces, as the sensors are told or as `force_axes` found them
+    `duration` [s]: of the steady part
+    `zeroed`: whether the sensors' zero is known, from the air cut or from stretches in which nothing is cut
     """
 
     cut_id: str
@@ -69,16 +63,9 @@ class MeasuredForce:
 class Calibrated:
     """A campaign's coefficients.
 
-    Parameters
-    ----------
-    forces : ForceCalibration
-    signal : SignalCalibration or None
-        With the method of that name.
-    choices : tuple of AxesChoice
-        Where the axes were asked for: all that are physical, the one that was taken first; else none.
-    used : tuple of MeasuredForce
-    left_out : tuple of (cut id, reason)
-    notes : tuple of str
+    `signal`: with the method of that name
+    `choices`: where the axes were asked for: all that are physical, the one that was taken first; else none
+    `left_out`: tuple of (cut id, reason)
     """
 
     forces: ForceCalibration
@@ -106,19 +93,11 @@ def measure_force(
 ) -> MeasuredForce:
     """Return lines and mean of the force in the steady part of a recording.
 
-    Parameters
-    ----------
-    recording : Recording
-        With force sensors along X and Y, and along the axis (Z) where there is one.
-    air : Recording or None
-        The same without cutting: where zero is. Without it the record's own idle stretches tell, before and after the cut; between
-        them a charge amplifier drifts evenly.
-    max_frequency : float [Hz]
-
-    Raises
-    ------
-    InputError
-        A force sensor is missing, or the record has no steady part.
+    `recording`: with force sensors along X and Y, and along the axis (Z) where there is one
+    `air`: the same without cutting: where zero is. Without it the record's own idle stretches tell, before and after the cut; between them
+        a charge amplifier drifts evenly.
+    `max_frequency` [Hz]
+    Raises `InputError`: a force sensor is missing, or the record has no steady part.
     """
     samples, sensors = _forces(recording, cut_id)
     if np.any(np.isnan(samples)):
@@ -230,21 +209,12 @@ def calibrate(
 ) -> Calibrated:
     """Return the cutting coefficients of a campaign of cuts at several feeds.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        With force sensors; its workpiece's coefficients are not used.
-    read : callable
-        Given a cut, returns its recordings. A recording that cannot be used is left out with its reason.
-    signal : bool
-        Fit the whole signal; else mean forces.
-    max_frequency : float [Hz]
-        Highest line of the signal's fit.
-    dynamometer : Dynamometer, optional
-        What to find of the sensor, with the signal's fit; see `calibrate_signal`.
-    free_helix : bool
-    any_axes : bool
-        Find which channel shows which axis and sign; else they are as told.
+    `campaign`: with force sensors; its workpiece's coefficients are not used
+    `read`: given a cut, returns its recordings. A recording that cannot be used is left out with its reason.
+    `signal`: fit the whole signal; else mean forces
+    `max_frequency` [Hz]: highest line of the signal's fit
+    `dynamometer`: what to find of the sensor, with the signal's fit; see `calibrate_signal`
+    `any_axes`: find which channel shows which axis and sign; else they are as told
     """
     if not campaign.cuts:
         raise InputError("cuts", "none", "recordings of the cutting force")

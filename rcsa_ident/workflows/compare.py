@@ -44,13 +44,9 @@ class Place(StrEnum):
 class LocalMode:
     """A mode that shows in a receptance.
 
-    Parameters
-    ----------
-    frequency : float [rad/s]
-        Natural frequency.
-    damping : float [-]
-    compliance : float [m/N]
-        Of the whole receptance there; its inverse is the dynamic stiffness.
+    `frequency` [rad/s]: natural frequency
+    `damping` [-]
+    `compliance` [m/N]: of the whole receptance there; its inverse is the dynamic stiffness
     """
 
     frequency: float
@@ -62,23 +58,13 @@ class LocalMode:
 class ResponseComparison:
     """One response, twice.
 
-    Parameters
-    ----------
-    place : Place
-    axis : Dof
-    omega : array, shape (n,) [rad/s]
-        The hammer test's, within the band where the machine was identified.
-    hammer, identified : complex arrays, shape (n,) [m/N]
-    deviation : (array, array) or None
-        Standard deviations of the identified real and imaginary part.
-    frac : float [-]
-        Over the whole band.
-    error : float [-]
-        ||identified - hammer|| / ||hammer||.
-    modes : tuple of (LocalMode, LocalMode or None)
-        Of the hammer test, and the identified one that belongs to it.
-    band_frac : (array, array)
-        Middles of bands [rad/s], FRAC in each.
+    `omega` [rad/s], shape (n,): the hammer test's, within the band where the machine was identified
+    `hammer`, `identified` [m/N], shape (n,)
+    `deviation`: (array, array) or None; standard deviations of the identified real and imaginary part
+    `frac` [-]: over the whole band
+    `error` [-]: ||identified - hammer|| / ||hammer||
+    `modes`: tuple of (LocalMode, LocalMode or None); of the hammer test, and the identified one that belongs to it
+    `band_frac`: (array, array); middles of bands [rad/s], FRAC in each
     """
 
     place: Place
@@ -102,16 +88,10 @@ def compare(
 ) -> list[ResponseComparison]:
     """Return each hammer test beside what the identified machine says of the same response.
 
-    Parameters
-    ----------
-    machine : Machine
-    tests : mapping of (Place, Dof) to (array, complex array), shapes (n,) [rad/s] and (n,) [m/N]
-    assembly : ToolAssembly or None
-        Of all places but the bare flange.
-    speed : float or None [rad/s]
-        For a machine that changes with it; by default the middle of the campaign's.
-    bands : bool
-        Also the posterior's standard deviations.
+    `tests`: mapping of (Place, Dof) to (array, complex array), shapes (n,) [rad/s] and (n,) [m/N]
+    `assembly`: of all places but the bare flange
+    `speed` [rad/s]: for a machine that changes with it; by default the middle of the campaign's
+    `bands`: also the posterior's standard deviations
     """
     found = []
     for (place, axis), (omega, values) in tests.items():
@@ -180,10 +160,7 @@ def local_modes(omega: FloatArray, values: ComplexArray, noise: FloatArray | Non
     A rational function is fitted (`dynamics.rational`); of its poles those count that lie in the band, oscillate, and make up a
     visible share of the receptance where they stand.
 
-    Parameters
-    ----------
-    noise : array, shape (n,), optional [m/N]
-        Standard deviation of the real and of the imaginary part each; by default from neighbouring frequencies.
+    `noise` [m/N], shape (n,): standard deviation of the real and of the imaginary part each; by default from neighbouring frequencies
     """
     noise = np.maximum(neighbour_noise(values) if noise is None else noise, LEAST_NOISE * np.abs(values))
     fit = rational_fit(omega, values, noise=noise)

@@ -34,13 +34,8 @@ _STEP = 1e-4
 class Support:
     """A known machine that the assembly was clamped in.
 
-    Parameters
-    ----------
-    flange : Substructure
-        One bending plane, or both where they feel each other.
-    joint : LumpedJoint
-    axis : Dof or None
-        Along which was tapped; None is the plane's own.
+    `flange`: one bending plane, or both where they feel each other
+    `axis`: along which was tapped; None is the plane's own
     """
 
     flange: Substructure
@@ -52,23 +47,13 @@ class Support:
 class TapTest:
     """One measured translation receptance of an assembly.
 
-    Parameters
-    ----------
-    name : str
-    assembly : ToolAssembly
-        Its own contact is not used.
-    omega : array, shape (n,) [rad/s]
-    values : complex array, shape (n,) [m/N]
-    support : Support or None
-        None is free in space.
-    row, col : str
-        ``tip``, or ``flange`` of a free assembly, or ``spindle`` of a clamped one.
-    std : array, shape (n,), or None [m/N]
-        Of the real and of the imaginary part each; None finds it from neighbouring frequencies.
-    band : (float, float) or None [rad/s]
-        What is used; None is all.
-    remarks : tuple of Remark
-        What the file does not state and was assumed.
+    `assembly`: its own contact is not used
+    `omega` [rad/s], shape (n,); `values` [m/N], shape (n,)
+    `support`: None is free in space
+    `row`, `col`: ``tip``, or ``flange`` of a free assembly, or ``spindle`` of a clamped one
+    `std` [m/N], shape (n,): of the real and of the imaginary part each; None finds it from neighbouring frequencies
+    `band`: (float, float) or None [rad/s]; what is used; None is all
+    `remarks`: what the file does not state and was assumed
     """
 
     name: str
@@ -105,23 +90,15 @@ class TapTest:
 class ContactCalibration:
     """What tap tests say of a contact.
 
-    Parameters
-    ----------
-    contact : Contact
-    log_std : array, shape (4,)
-        Standard deviations of the logarithms of `NAMES`, residuals that go together over frequency taken into account.
-    correlation : array, shape (4, 4)
-    modulus : float [-]
-        Factor on all moduli of tool and holder that went with it.
-    modulus_std : float [-]
-    gain : dict of tap name to float [-]
-        Factor on each measured receptance's scale that went with it: hammer and sensor are known to a few percent only.
-    model_error : float [-]
-        Share of the receptances that neither model nor noise explain.
-    misfit : dict of tap name to float [-]
-        Root mean square of log(measured / model).
-    told : tuple of bool, length 4
-    notes : tuple of str
+    `log_std`, shape (4,): standard deviations of the logarithms of `NAMES`, residuals that go together over frequency taken into account
+    `correlation`, shape (4, 4)
+    `modulus` [-]: factor on all moduli of tool and holder that went with it
+    `modulus_std` [-]
+    `gain`: dict of tap name to float [-], factor on each measured receptance's scale that went with it: hammer and sensor are known to a
+        few percent only
+    `model_error` [-]: share of the receptances that neither model nor noise explain
+    `misfit`: dict of tap name to float [-], root mean square of log(measured / model)
+    `told`: tuple of bool, length 4
     """
 
     contact: Contact

@@ -19,11 +19,7 @@ ENOUGH_TO_JUDGE = 3
 def left_open(campaign: Campaign, readings: Sequence[Reading]) -> tuple[str, ...]:
     """Return what the usable cuts cannot tell of planes that feel each other, and whether nothing judges the answer, in words.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    readings : sequence of Reading
-        Of its cuts, with their verdicts.
+    `readings`: of its cuts, with their verdicts
     """
     usable = {each.cut_id for each in readings if each.measurements}
     axes = {axis for each in readings for measurement in each.measurements for axis in measurement.axes}

@@ -32,16 +32,9 @@ _ENDS = {Place.TIP: ("tip", "tip"), Place.CROSS: ("spindle", "tip"), Place.SPIND
 class FlangeTap:
     """A hammer test of one tooling clamped in the machine.
 
-    Parameters
-    ----------
-    name : str
-    assembly : ToolAssembly
-    place : Place
-        All but the bare flange.
-    omega : array, shape (n,) [rad/s]
-    values : complex array, shape (n,) [m/N]
-    remarks : tuple of Remark
-        What the file does not state and was assumed.
+    `place`: all but the bare flange
+    `omega` [rad/s], shape (n,); `values` [m/N], shape (n,)
+    `remarks`: what the file does not state and was assumed
     """
 
     name: str
@@ -61,16 +54,10 @@ def flange_from_taps(
 ) -> DecoupledFlange:
     """Return the flange that explains all tests of one axis.
 
-    Parameters
-    ----------
-    taps : sequence of FlangeTap
-        At the same frequencies; those with one tooling may be of several places.
-    joint : LumpedJoint or None
-        Between holder and spindle; None leaves it in the flange.
-    least_damping : float or None
-        As in `coupling.flange_fit.least_squares_flange`.
-    model_share : float [-]
-        Standard deviation of what the noise between neighbouring frequencies does not show, as a share of each receptance.
+    `taps`: at the same frequencies; those with one tooling may be of several places
+    `joint`: between holder and spindle; None leaves it in the flange
+    `least_damping`: as in `coupling.flange_fit.least_squares_flange`
+    `model_share` [-]: standard deviation of what the noise between neighbouring frequencies does not show, as a share of each receptance
     """
     if not taps:
         raise InputError("taps", "none", "hammer tests with at least three toolings")
@@ -95,16 +82,10 @@ def flange_from_taps(
 def axial_flange_from_tap(tooling: Tooling, omega: FloatArray, values: ComplexArray, model_share: float = MODEL_SHARE) -> AxialFlange:
     """Return what stands behind the flange along the axis, from one hammer test along it: W = A21 (A11 - C11)^-1 A12 - A22.
 
-    Parameters
-    ----------
-    tooling : Tooling
-        That was clamped; as rods it is as its drawing says.
-    omega : array, shape (n,) [rad/s]
-        Rising, above 0.
-    values : complex array, shape (n,) [m/N]
-        At the tip, along the axis.
-    model_share : float [-]
-        As in `flange_from_taps`.
+    `tooling`: that was clamped; as rods it is as its drawing says
+    `omega` [rad/s], shape (n,): rising, above 0
+    `values` [m/N], shape (n,): at the tip, along the axis
+    `model_share` [-]: as in `flange_from_taps`
     """
     free = rod_poles(tooling.assembly, float(omega[-1])).receptance(omega).values
     between = free[:, 0, 1] * free[:, 1, 0]

@@ -123,30 +123,16 @@ def observe(
 ) -> MonitoredCut:
     """Return the forces of one recording.
 
-    Parameters
-    ----------
-    machine : Machine
-        Its flange without the joint in front of it, and the joint: the sensor looks at the spindle.
-    assembly : ToolAssembly
-        Of the tooling that was cut with; it need not be one of the identification's.
-    teeth : int
-    cut, air : Recording
-        The air cut, where there is one, with the same clamping and speed: its run-out is taken out.
-    programmed : float [rad/s], optional
-        Spindle speed, to 1 %; by default from the trigger.
-    method : ObserverMethod
-        `Resonators` or `PaperWalk`.
-    bandwidth : float [rad/s], optional
-        Up to which the observer shall follow the force; by default the end of the identified band.
-    smooth : bool
-        Every sample given the whole record, without lag; else as it would be live.
-
-    Raises
-    ------
-    InputError
-        If the recording has no displacement or no speed, or the machine's flange holds the joint's compliance, as a decoupled one does.
-    Unsteady
-        If it has lost samples, no steady part, or a vibration that does not follow the speed.
+    `machine`: its flange without the joint in front of it, and the joint: the sensor looks at the spindle
+    `assembly`: of the tooling that was cut with; it need not be one of the identification's
+    `cut`, `air`: the air cut, where there is one, with the same clamping and speed: its run-out is taken out
+    `programmed` [rad/s]: spindle speed, to 1 %; by default from the trigger
+    `method`: `Resonators` or `PaperWalk`
+    `bandwidth` [rad/s]: up to which the observer shall follow the force; by default the end of the identified band
+    `smooth`: every sample given the whole record, without lag; else as it would be live
+    Raises `InputError` if the recording has no displacement or no speed, or the machine's flange holds the joint's compliance, as a
+        decoupled one does.
+    Raises `Unsteady` if it has lost samples, no steady part, or a vibration that does not follow the speed.
     """
     faults = (*raw_faults(cut), *(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ())))
     if faults:
@@ -222,10 +208,7 @@ def observe(
 def trigger_speed(recording: Recording) -> float:
     """Return the spindle's mean speed from a recording's trigger [rad/s].
 
-    Raises
-    ------
-    InputError
-        Without a trigger, or with fewer than three edges.
+    Raises `InputError` without a trigger, or with fewer than three edges.
     """
     found = recording.channel(Quantity.TRIGGER)
     if found is None:
@@ -464,13 +447,8 @@ def _widened(estimate: ForceEstimate, errors: list[float]) -> ForceEstimate:
 def wear_of(found: MonitoredCut, cutter: Cutter, conditions: CuttingConditions) -> WearIndicators:
     """Return the cutting coefficients of each revolution of a monitored cut.
 
-    Parameters
-    ----------
-    found : MonitoredCut
-        With both axes.
-    cutter : Cutter
-    conditions : CuttingConditions
-        Depth, feed and immersion of the cut; the speed is the record's own.
+    `found`: with both axes
+    `conditions`: depth, feed and immersion of the cut; the speed is the record's own
     """
     estimate = found.estimate
     columns = [estimate.axes.index(axis) for axis in (Dof.X, Dof.Y)]

@@ -64,14 +64,9 @@ ReadTest = Callable[[HammerTest], tuple[FloatArray, ComplexArray]]
 def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[[int, int], None] | None = None) -> list[Reading]:
     """Return the reading of every cut of a campaign, in its order.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    read : callable
-        Given a cut, returns its recordings; a bad file is a reason to leave the cut out, not to stop.
-    map : callable
-        Cuts are independent of each other.
-    progress : callable of (done, total)
+    `read`: given a cut, returns its recordings; a bad file is a reason to leave the cut out, not to stop
+    `map`: cuts are independent of each other
+    `progress`: callable of (done, total)
     """
     readings = []
     for reading in map(partial(judge_cut, campaign, read), campaign.cuts):
@@ -94,10 +89,7 @@ def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
 def read_of(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None) -> Reading:
     """Return what the recordings of a cut or of a pass say, their clock already set right.
 
-    Raises
-    ------
-    InputError
-        As `measure_cut` and `measure_pass`.
+    Raises `InputError` as `measure_cut` and `measure_pass`.
     """
     cutter = campaign.toolings[cut.tooling].cutter
     if cut.last_speed is None:
@@ -113,15 +105,7 @@ def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:
 def hammer_lines(campaign: Campaign, read: ReadTest) -> tuple[HammerLines, ...]:
     """Return the lines of a campaign's hammer tests, in its order.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    read : callable
-
-    Raises
-    ------
-    InputError
-        If a file does not hold the FRF, or the FRF no line within the test's band.
+    Raises `InputError` if a file does not hold the FRF, or the FRF no line within the test's band.
     """
     return tuple(_lines_of(test, read(test)) for test in campaign.tests)
 
@@ -164,25 +148,12 @@ def identify(
 ) -> Identification:
     """Return modes and joint from the usable cuts, and from hammer tests beside them or in their place.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    readings : sequence of Reading
-        As `judge` returns them.
-    method : Method
-    seed : int
-        Same seed, same answer, whatever `map` is.
-    map : callable
-        The builtin, or a pool's: the method's long work goes through it.
-    progress : callable, optional
-        Told of every step of the search; with a pool's map it has to be picklable.
-    tests : sequence of HammerLines
-        As `hammer_lines` returns them.
-
-    Raises
-    ------
-    InputError
-        If no cut is usable, and there is no hammer test; or of a robot's cuts at several postures.
+    `readings`: as `judge` returns them
+    `seed`: same seed, same answer, whatever `map` is
+    `map`: the builtin, or a pool's: the method's long work goes through it
+    `progress`: told of every step of the search; with a pool's map it has to be picklable
+    `tests`: as `hammer_lines` returns them
+    Raises `InputError` if no cut is usable, and there is no hammer test; or of a robot's cuts at several postures.
     """
     _at_one_posture(campaign)
     found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings)
@@ -199,12 +170,7 @@ def _at_one_posture(campaign: Campaign) -> None:
 
 
 def clock_error(readings: Sequence[Reading]) -> float | None:
-    """Return by what share a recorder's clock runs fast if the spindle keeps its speed in the mean, None where it shows no error.
-
-    Parameters
-    ----------
-    readings : sequence of Reading
-    """
+    """Return by what share a recorder's clock runs fast if the spindle keeps its speed in the mean, None where it shows no error."""
     # of a pass nobody knows when its programmed speeds were reached
     single = [(each, each.measurements[0]) for each in readings if len(each.measurements) == 1]
     off = np.array([measurement.spindle_speed / each.programmed_speed - 1.0 for each, measurement in single])
@@ -221,10 +187,6 @@ def clock_remark(readings: Sequence[Reading]) -> Remark | None:
 
     A recorder whose clock is off and a spindle that turns at another speed than it is told look alike; only of the former are all
     frequencies wrong by as much.
-
-    Parameters
-    ----------
-    readings : sequence of Reading
     """
     error = clock_error(readings)
     if error is None:
@@ -352,15 +314,9 @@ def with_rough(
 ) -> IdentificationData:
     """Return the data whose tool-holders, depths and sensors are known as well as drawings, earlier cuts and campaign say.
 
-    Parameters
-    ----------
-    data : IdentificationData or None
-        Of cuts; None where there are hits of the tip alone.
-    campaign : Campaign
-    known : KnownToolings, optional
-        What earlier cuts have told.
-    tests : sequence of HammerLines
-        Hits of the tip, behind the cuts.
+    `data`: of cuts; None where there are hits of the tip alone
+    `known`: what earlier cuts have told
+    `tests`: hits of the tip, behind the cuts
     """
     names = dict.fromkeys([*(() if data is None else data.toolings), *(test.tooling for test in tests)])
     drawn = [campaign.toolings[name] for name in names]

@@ -35,24 +35,13 @@ def identify_robot(
 ) -> RobotIdentification:
     """Return a robot as its cuts tell it.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        Each cut with the posture that it was made at.
-    readings : sequence of Reading
-        As `identify.judge` returns them.
-    robot : FlexibleRobot
-        Lengths and masses, taken as exact, the whole spindle among the payload; springs and dampers as a first belief.
-    seed : int
-        Same seed, same answer.
-    map : callable
-        The builtin, or a pool's.
-    report : callable of (stage, cost, solution), optional
-
-    Raises
-    ------
-    InputError
-        If a cut tells no posture, if no cut is usable, or if none is slow enough to tell the arm.
+    `campaign`: each cut with the posture that it was made at
+    `readings`: as `identify.judge` returns them
+    `robot`: lengths and masses, taken as exact, the whole spindle among the payload; springs and dampers as a first belief
+    `seed`: same seed, same answer
+    `map`: the builtin, or a pool's
+    `report`: callable of (stage, cost, solution)
+    Raises `InputError` if a cut tells no posture, if no cut is usable, or if none is slow enough to tell the arm.
     """
     data, postures = robot_data(campaign, readings, robot)
     priors = arm_priors(robot.model, robot.tilts)

@@ -45,13 +45,8 @@ _MISSED = 0.1
 class Believed:
     """What is believed of a tip and of the coefficients before labels.
 
-    Parameters
-    ----------
-    prior : UncertainTip
-    coefficients : CuttingCoefficients
-        Their means.
-    remarks : tuple of str
-        What the user should know of them.
+    `coefficients`: their means
+    `remarks`: what the user should know of them
     """
 
     prior: UncertainTip
@@ -110,22 +105,11 @@ def learn_from_cuts(
 ) -> LearntTip:
     """Return what is believed of a tip after labelled cuts.
 
-    Parameters
-    ----------
-    believed : Believed
-    tooling : Tooling
-    cut : CutSpec
-        That all cuts share.
-    cuts : TestedCuts
-        May be none: the answer is then drawn from what was believed before.
-    method : StabilityMethod
-        Computes the limits of each draw; a draw costs one at every speed that was tested.
-    model : LabelModel, optional
-    seed : int
-        The same one, the same answer, on any number of processes.
-    effort : Effort, optional
-    map : callable
-        Maps a function over some draws at a time, as the built-in does.
+    `cut`: that all cuts share
+    `cuts`: may be none: the answer is then drawn from what was believed before
+    `method`: computes the limits of each draw; a draw costs one at every speed that was tested
+    `seed`: the same one, the same answer, on any number of processes
+    `map`: maps a function over some draws at a time, as the built-in does
     """
     model = model or LabelModel()
     # the mean of the coefficients is that which was believed; spreads that a cut names for itself belong to it
@@ -159,12 +143,8 @@ class _Mapped:
 class NextTest:
     """A cut that is worth a test.
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-    axial_depth : float [m]
-    probability_stable : float [-]
-        As it is believed now.
+    `spindle_speed` [rad/s]; `axial_depth` [m]
+    `probability_stable` [-]: as it is believed now
     """
 
     spindle_speed: float
@@ -177,16 +157,8 @@ def next_tests(
 ) -> list[NextTest]:
     """Return the cuts whose labels, taken together, tell most, the most telling first.
 
-    Parameters
-    ----------
-    learnt : LearntTip
-    process : MillingProcess
-    count : int
-    among : TestedCuts or None
-        Candidates, whatever their verdicts; None proposes cuts at some of the speeds, up to the largest depth.
-    speeds : array, shape (n,) [rad/s]
-    max_depth : float [m]
-    seed : int
+    `among`: candidates, whatever their verdicts; None proposes cuts at some of the speeds, up to the largest depth
+    `speeds` [rad/s], shape (n,); `max_depth` [m]
     """
     if among is None:
         few = speeds[np.unique(np.linspace(0, speeds.size - 1, min(speeds.size, _MOST_SPEEDS)).astype(int))]

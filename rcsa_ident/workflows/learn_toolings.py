@@ -71,17 +71,11 @@ class Learnt:
 class LearntTooling:
     """A tooling before and after its cuts and hits.
 
-    Parameters
-    ----------
-    drawn : Tooling
-    tooling : Tooling
-        With the most probable values and what is left open of them. It belongs to no model any more: what is known of its model is in it.
-    by : Alteration
-        How it differs from its drawing.
-    deviation, before : Alteration
-        Standard deviations of that, after the cuts and before; 0 where the drawing is exact.
-    contradiction : str
-        What speaks against it; empty where nothing does.
+    `tooling`: with the most probable values and what is left open of them. It belongs to no model any more: what is known of its model is
+        in it.
+    `by`: how it differs from its drawing
+    `deviation`, `before`: standard deviations of that, after the cuts and before; 0 where the drawing is exact
+    `contradiction`: what speaks against it; empty where nothing does
     """
 
     drawn: Tooling
@@ -96,17 +90,9 @@ class LearntTooling:
 class LearntToolings:
     """What further cuts have told.
 
-    Parameters
-    ----------
-    toolings : tuple of LearntTooling
-    keys : tuple of str
-        The campaign's for each of them.
-    machine : IdentifiedMachine
-        As these cuts have taught it, too.
-    model_error : tuple of float [-]
-        Share of the lines of each axis that is left unexplained.
-    converged : bool
-    notes : tuple of str
+    `keys`: the campaign's for each of them
+    `machine`: as these cuts have taught it, too
+    `model_error`: tuple of float [-], share of the lines of each axis that is left unexplained
     """
 
     toolings: tuple[LearntTooling, ...]
@@ -127,21 +113,11 @@ def learn_toolings(
 ) -> LearntToolings:
     """Return what the usable cuts of a campaign and hits of the tip tell of its toolings, on a machine that earlier cuts have told.
 
-    Parameters
-    ----------
-    machine : IdentifiedMachine
-        Its posterior is what is known of it before.
-    campaign : Campaign
-        Of toolings that are new to the machine; one stable cut of each, or one hit of its tip along X and Y, is enough.
-    readings : sequence of Reading
-        As `rcsa_ident.workflows.identify.judge` returns them.
-    tests : sequence of HammerLines
-        As `rcsa_ident.workflows.identify.hammer_lines` returns those of the campaign.
-
-    Raises
-    ------
-    InputError
-        If machine, toolings or cuts do not tell what is needed.
+    `machine`: its posterior is what is known of it before
+    `campaign`: of toolings that are new to the machine; one stable cut of each, or one hit of its tip along X and Y, is enough
+    `readings`: as `rcsa_ident.workflows.identify.judge` returns them
+    `tests`: as `rcsa_ident.workflows.identify.hammer_lines` returns those of the campaign
+    Raises `InputError` if machine, toolings or cuts do not tell what is needed.
     """
     known = KnownMachine(machine.posteriors(), machine.toolings)
     taps = [tap_lines(test, machine.band) for test in tests]
@@ -175,18 +151,9 @@ def learn_toolings(
 def campaign_of_taps(tooling: Tooling, pairs: Sequence[tuple[str, str]], sensor_mass: float = 0.0) -> Campaign:
     """Return a campaign of hits of one tooling's tip, the spindle at standstill.
 
-    Parameters
-    ----------
-    tooling : Tooling
-    pairs : sequence of (str, str)
-        Axes of response and force of each hit, X or Y.
-    sensor_mass : float [kg]
-        Of the sensor at the tip.
-
-    Raises
-    ------
-    InputError
-        If there are none, or one along other axes or with two.
+    `pairs`: sequence of (str, str); axes of response and force of each hit, X or Y
+    `sensor_mass` [kg]: of the sensor at the tip
+    Raises `InputError` if there are none, or one along other axes or with two.
     """
     for response, force in pairs:
         if response != force or response not in ("X", "Y"):
@@ -204,16 +171,8 @@ def tap_lines(test: HammerLines, band: tuple[float, float]) -> HammerLines:
 
     A sensor of mass m at the driven point adds its inertia there, 1/H' = 1/H - w^2 m: so H = H'/(1 + w^2 m H') [ewins2000].
 
-    Parameters
-    ----------
-    test : HammerLines
-    band : (float, float) [rad/s]
-        Lowest and highest frequency at which the machine is known.
-
-    Raises
-    ------
-    InputError
-        Force or response is not at the tip, or too few lines lie in the band.
+    `band`: (float, float) [rad/s]; lowest and highest frequency at which the machine is known
+    Raises `InputError`: force or response is not at the tip, or too few lines lie in the band.
     """
     for name in ("response", "force"):
         z = getattr(test, name)

@@ -31,20 +31,11 @@ def listen_to(
 ) -> Listening:
     """Return what channels of one quantity say, lost and saturated samples told, with the samples that were judged.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    channels : sequence of array, shape (n,)
-        Lost samples are NaN.
-    quantity, teeth, spindle_speed, between
-        As of `rcsa_ident.signals.listening.listen`.
-    name : str
-        Of the recording.
-
-    Raises
-    ------
-    InputError
-        Too many samples are lost, or the record says nothing at all.
+    `rate` [Hz]
+    `channels`: sequence of array, shape (n,); lost samples are NaN
+    `quantity`, `teeth`, `spindle_speed`, `between`: as of `rcsa_ident.signals.listening.listen`
+    `name`: of the recording
+    Raises `InputError`: too many samples are lost, or the record says nothing at all.
 
     Examples
     --------

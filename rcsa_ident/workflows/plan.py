@@ -42,23 +42,14 @@ LOBE_FREQUENCIES = (100.0, 2.0)
 class CutConstraints:
     """Which cuts may be made.
 
-    Parameters
-    ----------
-    lowest, highest : float [rad/s]
-        Spindle speeds.
-    depths : tuple of float [m]
-        Axial depths to choose from.
-    feed_per_tooth : float [m]
-    engagement : Engagement, Block, Stepover or EngagementMap
-    feed_angle : float [rad]
-    second_feed : float or None [rad]
-        Direction of the feed of other cuts: what is felt across the planes is then told better. None: all go along `feed_angle`.
-    margin : float [-]
-        The stability limit is at least so many times the depth, at the speed and `SPACING` around it.
-    method : StabilityMethod
-    chip_thickness : float or None [m]
-        Each tooling's feed per tooth is then the one at which its chip is nowhere thicker, and `feed_per_tooth` is not asked: high-feed
-        cutters take several times the feed of a wall.
+    `lowest`, `highest` [rad/s]: spindle speeds
+    `depths`: tuple of float [m], axial depths to choose from
+    `feed_per_tooth` [m]; `feed_angle` [rad]
+    `second_feed` [rad]: direction of the feed of other cuts: what is felt across the planes is then told better. None: all go along
+        `feed_angle`.
+    `margin` [-]: the stability limit is at least so many times the depth, at the speed and `SPACING` around it
+    `chip_thickness` [m]: each tooling's feed per tooth is then the one at which its chip is nowhere thicker, and `feed_per_tooth` is not
+        asked: high-feed cutters take several times the feed of a wall
     """
 
     lowest: float
@@ -105,15 +96,7 @@ class CutConstraints:
 
 @dataclass(frozen=True, slots=True)
 class PlannedCut:
-    """A cut to make.
-
-    Parameters
-    ----------
-    tooling : str
-    conditions : CuttingConditions
-    limit_depth : float [m]
-        Up to which it is expected to be stable; infinite beyond what was looked at.
-    """
+    """A cut to make. `limit_depth` [m]: up to which it is expected to be stable; infinite beyond what was looked at."""
 
     tooling: str
     conditions: CuttingConditions
@@ -124,13 +107,8 @@ class PlannedCut:
 class ShortestPlan:
     """How many of a plan's cuts a wanted band takes.
 
-    Parameters
-    ----------
-    cuts : int
-        The first so many; all of them where the band is not reached.
-    band : float [-]
-        What they reach: the largest of the targets'.
-    reached : bool
+    `cuts`: the first so many; all of them where the band is not reached
+    `band` [-]: what they reach: the largest of the targets'
     """
 
     cuts: int
@@ -142,23 +120,14 @@ class ShortestPlan:
 class PlannedCuts:
     """Cuts to make next, those that tell most first.
 
-    Parameters
-    ----------
-    cuts : tuple of PlannedCut, length n
-    targets : tuple of str, length t
-        The toolings whose tooltips are wanted.
-    band : array, shape (n + 1, t) [-]
-        Expected relative standard deviation of each target's tooltip FRF, before and after each cut.
-    even : array, shape (t,) [-]
-        The same after as many cuts at even distances of the allowed speeds, as deep as they may be.
-    even_cuts : tuple of PlannedCut
-        These.
-    candidates, unstable : int
-        Cuts to choose from, and those that were left out since they may chatter.
-    warnings : tuple of str
-        What did not go as it was asked for.
-    judges : tuple of PlannedCut
-        One stable cut with each target that is not cut with otherwise: nothing is learned from it, it judges the answer.
+    `cuts`: tuple of PlannedCut, length n
+    `targets`: tuple of str, length t; the toolings whose tooltips are wanted
+    `band` [-], shape (n + 1, t): expected relative standard deviation of each target's tooltip FRF, before and after each cut
+    `even` [-], shape (t,): the same after as many cuts at even distances of the allowed speeds, as deep as they may be
+    `even_cuts`: these
+    `candidates`, `unstable`: cuts to choose from, and those that were left out since they may chatter
+    `warnings`: what did not go as it was asked for
+    `judges`: one stable cut with each target that is not cut with otherwise: nothing is learned from it, it judges the answer
     """
 
     cuts: tuple[PlannedCut, ...]
@@ -198,34 +167,17 @@ def plan_cuts(
 ) -> PlannedCuts:
     """Return the cuts that tell most about the targets' tooltips: greedy choice, then exchange.
 
-    Parameters
-    ----------
-    machine : IdentifiedMachine
-        With posteriors.
-    toolings : sequence of Tooling
-        To cut with.
-    targets : sequence of Tooling
-        Whose tooltip FRFs are wanted; they need not be cut with.
-    allowed : CutConstraints
-    coefficients : CuttingCoefficients
-        With the spreads of what is not known about them.
-    noise : float [m]
-        Standard deviation of a displacement line's real and imaginary part each.
-    model_error : mapping of Dof to float
-        Share of each line that stays unexplained, as identified.
-    band_hz : (float, float)
-        Where the tooltips are wanted.
-    count : int
-        Most cuts.
-    wanted : float or None [-]
-        Stop at the fewest cuts that are found to bring all targets' bands below it.
-    goal : Goal or None
-        By default the targets' mean variance.
-
-    Raises
-    ------
-    InputError
-        If an axis has no posterior, or no cut is stable and allowed.
+    `machine`: with posteriors
+    `toolings`: to cut with
+    `targets`: whose tooltip FRFs are wanted; they need not be cut with
+    `coefficients`: with the spreads of what is not known about them
+    `noise` [m]: standard deviation of a displacement line's real and imaginary part each
+    `model_error`: share of each line that stays unexplained, as identified
+    `band_hz`: (float, float); where the tooltips are wanted
+    `count`: most cuts
+    `wanted` [-]: stop at the fewest cuts that are found to bring all targets' bands below it
+    `goal`: by default the targets' mean variance
+    Raises `InputError` if an axis has no posterior, or no cut is stable and allowed.
     """
     check(machine, toolings, targets, count, band_hz)
     goal = MeanVariance() if goal is None else goal
@@ -363,14 +315,7 @@ def limits_at(
 ) -> FloatArray:
     """Return the stability limit at each speed, up to twice what the constraints ask for, shape (n,) [m].
 
-    Parameters
-    ----------
-    machine : IdentifiedMachine
-    tooling : Tooling
-    allowed : CutConstraints
-    coefficients : CuttingCoefficients
-    feed_angle : float [rad]
-    speeds : array, shape (n,) [rad/s]
+    `feed_angle` [rad]; `speeds` [rad/s], shape (n,)
     """
     omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
     # with unlike teeth the feed decides which of them cut

@@ -30,17 +30,10 @@ _STEP = 2e-3
 class PlannedPass:
     """A pass to make.
 
-    Parameters
-    ----------
-    tooling : str
-    conditions : CuttingConditions
-        With the first speed.
-    last_speed : float [rad/s]
-    seconds : float [s]
-    limit_depth : float [m]
-        Up to which it is expected to be stable at every speed that it crosses; infinite beyond what was looked at.
-    teeth : int
-        Of the cutter.
+    `conditions`: with the first speed
+    `last_speed` [rad/s]; `seconds` [s]
+    `limit_depth` [m]: up to which it is expected to be stable at every speed that it crosses; infinite beyond what was looked at
+    `teeth`: of the cutter
     """
 
     tooling: str
@@ -61,15 +54,10 @@ class PlannedPass:
 class PlannedPasses:
     """Passes to make, tooling by tooling, from the slowest up.
 
-    Parameters
-    ----------
-    passes : tuple of PlannedPass, length n
-    targets : tuple of str, length t
-        The toolings whose tooltips are wanted.
-    band : array, shape (n + 1, t) [-]
-        Expected relative standard deviation of each target's tooltip FRF, before and after each pass.
-    warnings : tuple of str
-        Passes that were left out since no depth is stable.
+    `passes`: tuple of PlannedPass, length n
+    `targets`: tuple of str, length t; the toolings whose tooltips are wanted
+    `band` [-], shape (n + 1, t): expected relative standard deviation of each target's tooltip FRF, before and after each pass
+    `warnings`: passes that were left out since no depth is stable
     """
 
     passes: tuple[PlannedPass, ...]
@@ -95,25 +83,12 @@ def plan_passes(
 ) -> PlannedPasses:
     """Return passes that cross all allowed speeds one after the other, each as deep as it is stable at every speed that it crosses.
 
-    Parameters
-    ----------
-    machine : IdentifiedMachine
-        With posteriors.
-    toolings, targets : sequence of Tooling
-        To cut with; whose tooltip FRFs are wanted.
-    allowed : CutConstraints
-    coefficients : CuttingCoefficients
-    noise, model_error, band_hz
-        As in `plan_cuts`.
-    count : int
-        Passes of each tooling.
-    seconds : float [s]
-        Length of each.
-
-    Raises
-    ------
-    InputError
-        If an axis has no posterior, the speeds of a pass lie too close or too far apart, or no pass is stable.
+    `machine`: with posteriors
+    `toolings`, `targets`: to cut with; whose tooltip FRFs are wanted
+    `noise`, `model_error`, `band_hz`: as in `plan_cuts`
+    `count`: passes of each tooling
+    `seconds` [s]: length of each
+    Raises `InputError` if an axis has no posterior, the speeds of a pass lie too close or too far apart, or no pass is stable.
     """
     check(machine, toolings, targets, count, band_hz)
     positive("seconds of a pass", seconds, "s")

@@ -40,21 +40,11 @@ class Opened(Protocol):
 def ring_tooling(tooling: Tooling, sounds: Sequence[Opened], bare_tool: Sequence[Opened] = (), mass: float | None = None) -> RungTooling:
     """Return what sounds of a tooling, of its tool alone and the tool's mass tell together.
 
-    Parameters
-    ----------
-    tooling : Tooling
-        As drawn.
-    sounds : sequence of Opened
-        Of the tool in its holder, hanging free; the first channel of each is listened to.
-    bare_tool : sequence of Opened
-        Of the tool alone.
-    mass : float or None [kg]
-        Of the tool alone.
-
-    Raises
-    ------
-    InputError
-        Nothing is given, nothing rings, or it is another tool that rings.
+    `tooling`: as drawn
+    `sounds`: of the tool in its holder, hanging free; the first channel of each is listened to
+    `bare_tool`: of the tool alone
+    `mass` [kg]: of the tool alone
+    Raises `InputError`: nothing is given, nothing rings, or it is another tool that rings.
     """
     if not sounds and not bare_tool and mass is None:
         raise InputError("recording", "none", "the sound of a hit, of the tooling or of the tool alone, or the tool's mass")

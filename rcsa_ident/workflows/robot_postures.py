@@ -26,23 +26,15 @@ _ALONG = 0.01
 class RobotAtPosture:
     """What `robot check` tells.
 
-    Parameters
-    ----------
-    tool_point : Frame
-        Where the tool-holder's flange sits, as seen from the base.
-    natural_frequencies, damping_ratios : arrays, shape (n,) [rad/s, -]
-        Without damping, rising; empty where no masses are known.
-    gravity_torques : array, shape (j,) [N m]
-        That hold the arm; empty likewise.
-    compliance : array, shape (3, 3) [m/N]
-        At rest, at the tool point in the base's axes.
-    sag : array, shape (3,) [m]
-        How far the tool point sinks under the arm's weight, what the control takes out left out; empty where no masses are known.
-    play : array, shape (3,) [m]
-        How far it may stand from the middle along each of the base's axes within the joints' play.
-    postures : array, shape (s, j) [rad]
-        All that bring the flange to the same place, within the joints' limits or not; the posture alone where the arm is not of the
-        kind of which they are known.
+    `tool_point`: where the tool-holder's flange sits, as seen from the base
+    `natural_frequencies`, `damping_ratios` [rad/s, -], shape (n,): without damping, rising; empty where no masses are known
+    `gravity_torques` [N m], shape (j,): that hold the arm; empty likewise
+    `compliance` [m/N], shape (3, 3): at rest, at the tool point in the base's axes
+    `sag` [m], shape (3,): how far the tool point sinks under the arm's weight, what the control takes out left out; empty where no masses
+        are known
+    `play` [m], shape (3,): how far it may stand from the middle along each of the base's axes within the joints' play
+    `postures` [rad], shape (s, j): all that bring the flange to the same place, within the joints' limits or not; the posture alone where
+        the arm is not of the kind of which they are known
     """
 
     tool_point: Frame
@@ -56,13 +48,7 @@ class RobotAtPosture:
 
 
 def at_posture(robot: FlexibleRobot, angles: FloatArray) -> RobotAtPosture:
-    """Return what a robot is at a posture.
-
-    Parameters
-    ----------
-    robot : FlexibleRobot
-    angles : array, shape (j,) [rad]
-    """
+    """Return what a robot is at a posture. `angles` [rad], shape (j,)."""
     model, posture = robot.model, robot.model.posture(angles)
     frequencies = ratios = torque = sunk = np.zeros(0)
     if model.weighed:
@@ -81,22 +67,12 @@ def at_posture(robot: FlexibleRobot, angles: FloatArray) -> RobotAtPosture:
 def following(robot: RobotModel, start: FloatArray, tips: FloatArray, axes: FloatArray, assembly: ToolAssembly) -> FloatArray:
     """Return a posture for each place of a tool's tip, shape (k, 6) [rad]: of all that reach it the one that turns the joints least.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    start : array, shape (6,) [rad]
-        Posture from which the first one is sought; the tool's x keeps its direction there as nearly as the axis allows.
-    tips : array, shape (k, 3) [m]
-        In the base's axes.
-    axes : array, shape (k, 3)
-        Unit vectors from the tip into the spindle.
-    assembly : ToolAssembly
-        The tool-holder that stands between tip and spindle.
-
-    Raises
-    ------
-    InputError
-        If a place is out of reach, or within reach of no allowed posture; it says which place.
+    `start` [rad], shape (6,): posture from which the first one is sought; the tool's x keeps its direction there as nearly as the axis
+        allows
+    `tips` [m], shape (k, 3): in the base's axes
+    `axes`, shape (k, 3): unit vectors from the tip into the spindle
+    `assembly`: the tool-holder that stands between tip and spindle
+    Raises `InputError` if a place is out of reach, or within reach of no allowed posture; it says which place.
     """
     here, sideways, found = robot.posture(start), tool_point_at(robot, start).turn[:, 0], []
     for number, (tip, axis) in enumerate(zip(tips, axes, strict=True), start=1):
@@ -125,13 +101,9 @@ def limits_along(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the stability limit and the chatter frequency at each posture and speed, shapes (k, n) [m, rad/s].
 
-    Parameters
-    ----------
-    change : ToolChange
-        On a `PosedRobot`, whose posture does not count; speeds rising, each once. No band is computed.
-    postures : array, shape (k, j) [rad]
-    progress : callable, optional
-        Told how many are done, and of how many.
+    `change`: on a `PosedRobot`, whose posture does not count; speeds rising, each once. No band is computed.
+    `postures` [rad], shape (k, j)
+    `progress`: told how many are done, and of how many
     """
     machine = change.machine
     if not isinstance(machine, PosedRobot):

@@ -86,29 +86,14 @@ class _Job:
 def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
     """Yield every tooling's cut at every speed of the plan, in the order in which they are made.
 
-    Parameters
-    ----------
-    setup : VirtualSetup
-    toolings : sequence of Tooling
-    seed : int
-        Same seed, same records.
-    map : callable
-        Runs the cuts; they do not depend on each other's order.
+    `seed`: same seed, same records
+    `map`: runs the cuts; they do not depend on each other's order
     """
     yield from map(_Worker(setup), list(_jobs(setup, toolings, seed)))
 
 
 def simulate_robot(setup: VirtualRobotSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
-    """Yield every tooling's cut at every posture and speed of the plan, in order.
-
-    Parameters
-    ----------
-    setup : VirtualRobotSetup
-    toolings : sequence of Tooling
-    seed : int
-        Same seed, same records.
-    map : callable
-    """
+    """Yield every tooling's cut at every posture and speed of the plan, in order. `seed`: same seed, same records."""
     rng = np.random.default_rng(seed)
     jobs = []
     for tooling in toolings:
@@ -126,14 +111,8 @@ def simulate_robot(setup: VirtualRobotSetup, toolings: Sequence[Tooling], seed: 
 def true_robot_tip(robot: VirtualRobot, posture: FloatArray, tooling: Tooling, omega: FloatArray, speed: float = 0.0) -> ComplexArray:
     """Return the tip's receptance over X, Y and Z of the spindle, from the full equations, shape (n, 3, 3) [m/N].
 
-    Parameters
-    ----------
-    robot : VirtualRobot
-    posture : array, shape (j,) [rad]
-    tooling : Tooling
-    omega : array, shape (n,) [rad/s]
-    speed : float [rad/s]
-        Of the spindle.
+    `posture` [rad], shape (j,); `omega` [rad/s], shape (n,)
+    `speed` [rad/s]: of the spindle
     """
     return frequency_response(robot_rotor(robot, posture, tooling.assembly), omega, speed, ALL_TIPS, ALL_TIPS)
 
@@ -141,12 +120,7 @@ def true_robot_tip(robot: VirtualRobot, posture: FloatArray, tooling: Tooling, o
 def true_receptances(setup: VirtualSetup, tooling: Tooling, speed: float | None = None) -> TrueReceptances:
     """Return tip-tip and flange-tip from the full equations: the tool's own, whatever gives way on the workpiece's side.
 
-    Parameters
-    ----------
-    setup : VirtualSetup
-    tooling : Tooling
-    speed : float [rad/s], optional
-        Of the spindle; by default the mean of the programmed speeds.
+    `speed` [rad/s]: of the spindle; by default the mean of the programmed speeds
     """
     frequency, speed = _truth_frequency(), float(np.mean(setup.plan.programmed)) if speed is None else speed
     outputs = ("tip.x", "tip.y", "flange.x", "flange.y")

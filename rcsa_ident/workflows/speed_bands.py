@@ -23,11 +23,7 @@ from rcsa_ident.workflows.identify import data_of
 class SpeedBand:
     """A range of spindle speeds and what its cuts say for themselves.
 
-    Parameters
-    ----------
-    speeds : (float, float) [rad/s]
-        Lowest and highest; one band ends where the next begins.
-    found : Identification
+    `speeds`: (float, float) [rad/s]; lowest and highest; one band ends where the next begins
     """
 
     speeds: tuple[float, float]
@@ -37,18 +33,9 @@ class SpeedBand:
 def speed_bands(campaign: Campaign, readings: Sequence[Reading], count: int, method: Method, seed: int, map: Map = map) -> list[SpeedBand]:
     """Return one identification for each of `count` equal ranges of the usable cuts' spindle speeds.
 
-    Parameters
-    ----------
-    count : int
-    method : Method
-        That starts from the whole campaign's answer: a band alone has too few cuts to be explored.
-    map : callable
-        The bands do not depend on each other.
-
-    Raises
-    ------
-    InputError
-        If a band has too few cuts with one of the toolings.
+    `method`: that starts from the whole campaign's answer: a band alone has too few cuts to be explored
+    `map`: the bands do not depend on each other
+    Raises `InputError` if a band has too few cuts with one of the toolings.
     """
     jobs = [_BandJob(method, speeds, data_of(campaign, cuts), seed) for speeds, cuts in split_by_speed(readings, count)]
     return list(map(_identify_band, jobs))
@@ -57,10 +44,7 @@ def speed_bands(campaign: Campaign, readings: Sequence[Reading], count: int, met
 def split_by_speed(readings: Sequence[Reading], count: int) -> list[tuple[tuple[float, float], list[Reading]]]:
     """Return `count` equal ranges of speed [rad/s], each with its usable cuts.
 
-    Raises
-    ------
-    InputError
-        If a range has too few cuts with one of the toolings.
+    Raises `InputError` if a range has too few cuts with one of the toolings.
     """
     # each window of a pass for itself
     usable = [(replace(each, measurements=(one,)), one.spindle_speed) for each in readings for one in each.measurements]

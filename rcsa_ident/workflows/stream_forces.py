@@ -26,14 +26,9 @@ LONGEST_BRIDGE = 0.1
 class AngleReference:
     """Lines whose phases tell the spindle's angle.
 
-    Parameters
-    ----------
-    spindle_speed : float [rad/s]
-        At which they were found.
-    line : complex array, shape (ORDERS + 1, a) [m]
-        Of the gap sensors at orders 0 to ORDERS, phases from the stream's first sample.
-    teeth : int
-        Orders that the teeth share are not looked at; 1: all are.
+    `spindle_speed` [rad/s]: at which they were found
+    `line` [m], shape (ORDERS + 1, a): of the gap sensors at orders 0 to ORDERS, phases from the stream's first sample
+    `teeth`: orders that the teeth share are not looked at; 1: all are
     """
 
     spindle_speed: float
@@ -48,18 +43,11 @@ class AngleReference:
 class AngleState:
     """Where the spindle stands beyond an angle that grows with the reference's speed.
 
-    Parameters
-    ----------
-    first : int
-        Sample with which this look began.
-    angle : float [rad]
-        At that sample.
-    slope : float [rad]
-        What comes to it with each sample.
-    sums : complex array, shape (ORDERS, a) [m]
-        Lines of the samples so far, under a Hann window.
-    known : bool
-        Whether the last look told the angle.
+    `first`: sample with which this look began
+    `angle` [rad]: at that sample
+    `slope` [rad]: what comes to it with each sample
+    `sums` [m], shape (ORDERS, a): lines of the samples so far, under a Hann window
+    `known`: whether the last look told the angle
     """
 
     first: int
@@ -73,14 +61,8 @@ class AngleState:
 class LiveState:
     """Where a stream stands.
 
-    Parameters
-    ----------
-    count : int
-        Samples so far, lost ones among them.
-    observer : ObserverState
-    angle : AngleState
-    gap, acceleration : arrays, shape (m, a)
-        Of the last revolution at most.
+    `count`: samples so far, lost ones among them
+    `gap`, `acceleration`, shape (m, a): of the last revolution at most
     """
 
     count: int
@@ -219,13 +201,8 @@ class LiveObserver:
 def live_observer(found: MonitoredCut, recording: Recording, follow: bool = True) -> LiveObserver:
     """Return the stream's observer of a monitored cut.
 
-    Parameters
-    ----------
-    found : MonitoredCut
-    recording : Recording
-        That it was made from: the stream's first samples.
-    follow : bool
-        Run-out follows the spindle; else it turns with the recording's mean speed for ever, as in `observe`.
+    `recording`: that it was made from: the stream's first samples
+    `follow`: run-out follows the spindle; else it turns with the recording's mean speed for ever, as in `observe`
     """
     axes = found.observer.axes
     run_out = tuple(each.run_out for each in axes if each.run_out is not None)

@@ -66,27 +66,15 @@ def tap_recordings(
 ) -> TapFrf:
     """Return the receptance that recordings of hits give together; its remarks say what was assumed.
 
-    Parameters
-    ----------
-    recordings : sequence of Opened
-        Each with one hit or several.
-    force, response : str or None
-        Names of channels; else the one that is a force, or comes in pulses, and the only other one.
-    quantity : str
-        What the response measures where its unit does not say: acceleration, velocity or displacement.
-    estimator, sensor_mass
-        As of `rcsa_ident.signals.tap.tap`.
-    axis : str
-        Machine axis of hammer and response, X or Y.
-    force_sensitivity, response_sensitivity : float or None
-        Signal per newton and per SI unit of the response, of channels in volts or in a unit that is not known.
-    reverse : bool
-        The sensor or the hammer is reversed: the receptance is turned.
-
-    Raises
-    ------
-    InputError
-        A channel is not told, the recordings have several rates, or no hit can be used.
+    `recordings`: each with one hit or several
+    `force`, `response`: names of channels; else the one that is a force, or comes in pulses, and the only other one
+    `quantity`: what the response measures where its unit does not say: acceleration, velocity or displacement
+    `estimator`, `sensor_mass`: as of `rcsa_ident.signals.tap.tap`
+    `axis`: machine axis of hammer and response, X or Y
+    `force_sensitivity`, `response_sensitivity`: signal per newton and per SI unit of the response, of channels in volts or in a unit that
+        is not known
+    `reverse`: the sensor or the hammer is reversed: the receptance is turned
+    Raises `InputError`: a channel is not told, the recordings have several rates, or no hit can be used.
     """
     SENSOR_MASS.checked("sensor_mass", sensor_mass)
     if quantity not in DERIVATIVES:
@@ -156,14 +144,8 @@ def _named(field: str, name: str, channels: Sequence[Channel]) -> int:
 def hammer_channel(channels: Sequence[FloatArray]) -> int:
     """Return which channel is the hammer's: a force comes in pulses, a response rings.
 
-    Parameters
-    ----------
-    channels : sequence of array, shape (n,)
-
-    Raises
-    ------
-    InputError
-        None is, or several are.
+    `channels`: sequence of array, shape (n,)
+    Raises `InputError`: none is, or several are.
     """
     lasts = np.array([_duration(channel) for channel in channels])
     order = np.argsort(lasts)

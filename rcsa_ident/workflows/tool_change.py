@@ -67,14 +67,8 @@ _FEWEST, _DRAWN_SECONDS = 20, 2.0
 class TipAnswer:
     """What the tip of a tooling does.
 
-    Parameters
-    ----------
-    tooling : Tooling
-    tip : UncertainReceptance
-    remarks : tuple of str
-        What the user should know.
-    speed : float or None [rad/s]
-        Spindle speed that it holds at; None where it does not change.
+    `remarks`: what the user should know
+    `speed` [rad/s]: spindle speed that it holds at; None where it does not change
     """
 
     tooling: Tooling
@@ -94,19 +88,11 @@ def tooltip(
 ) -> TipAnswer:
     """Return the tip's receptance of a tooling on a machine.
 
-    Parameters
-    ----------
-    machine : TipSource
-    tooling : Tooling
-    omega : array, shape (n,) [rad/s], default the machine's `lines`
-    speed : float or None [rad/s]
-        Spindle speed, for a machine that changes with it; by default the middle of the speeds that it is known at.
-    spread : bool
-        With what the records leave open.
-    stiffness_spread : float
-        Standard deviation of the tool-holder's stiffness, as a share.
-    relative : bool
-        Relative to the workpiece, as limits are computed from; by default the tool's own.
+    `omega`: array, shape (n,) [rad/s], default the machine's `lines`
+    `speed` [rad/s]: spindle speed, for a machine that changes with it; by default the middle of the speeds that it is known at
+    `spread`: with what the records leave open
+    `stiffness_spread`: standard deviation of the tool-holder's stiffness, as a share
+    `relative`: relative to the workpiece, as limits are computed from; by default the tool's own
     """
     if speed is not None:
         SPINDLE_SPEED.checked("speed", speed)
@@ -127,11 +113,7 @@ def tooltip(
 class Fitting:
     """Limits by a method that fits the cut, and the cut itself at those speeds.
 
-    Parameters
-    ----------
-    lobes : StabilityLobes
-    cuts : tuple of (speeds [rad/s], MonodromyOperator)
-        One for each block of speeds that share a tip; none where limits come from labels.
+    `cuts`: tuple of (speeds [rad/s], MonodromyOperator); one for each block of speeds that share a tip; none where limits come from labels
     """
 
     lobes: StabilityLobes
@@ -142,22 +124,11 @@ class Fitting:
 class ToolChange:
     """A tooling on a machine, and the cut that is asked about.
 
-    Parameters
-    ----------
-    machine : TipSource
-    tooling : Tooling
-    cut : CutSpec
-    speeds : array, shape (n,) [rad/s]
-        Rising.
-    max_depth : float [m]
-        Depths beyond it are not of interest.
-    method : StabilityMethod
-    draws : int
-        Machines drawn from what the records leave open; 0 leaves it aside.
-    stiffness_spread : float
-        Standard deviation of the tool-holder's stiffness, as a share.
-    recommend : bool
-        Whether cuts are recommended, too: zero-order limits alone are a preview, there at once.
+    `speeds` [rad/s], shape (n,): rising
+    `max_depth` [m]: depths beyond it are not of interest
+    `draws`: machines drawn from what the records leave open; 0 leaves it aside
+    `stiffness_spread`: standard deviation of the tool-holder's stiffness, as a share
+    `recommend`: whether cuts are recommended, too: zero-order limits alone are a preview, there at once
     """
 
     machine: TipSource
@@ -321,14 +292,9 @@ def probabilities_stable(change: ToolChange, cuts: TestedCuts) -> FloatArray:
 def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> StabilityMap:
     """Return the map of stable cuts up to the largest depth: above the first loss of stability a cut may be stable again.
 
-    Parameters
-    ----------
-    change : ToolChange
-        Its method, if that gives maps, else full-discretisation.
-    depths : int
-        Equal steps of the depth.
-    full : bool
-        Compute every point.
+    `change`: its method, if that gives maps, else full-discretisation
+    `depths`: equal steps of the depth
+    `full`: compute every point
     """
     method = change.method if isinstance(change.method, MonodromyMethod) else FullDiscretisation()
     speeds, depth = np.unique(change.speeds), change.max_depth * np.arange(1, depths + 1) / depths

@@ -101,14 +101,12 @@ def milling_multiplier(
 ) -> complex:
     """The largest Floquet multiplier of a milling cut by dense first-order semi-discretisation with matrix exponentials.
 
-    Parameters
-    ----------
-    modes : axis (0 or 1), natural frequency [Hz], damping ratio, mass [kg]
-    windows : (angle ahead of tooth 1, start, end, delay angle) of each tooth
-    stiffness, rub : tangential and radial, depth times K and depth times the viscous force per velocity
-    edges : angles of the steps from 0 to a period
-    clock : time of an angle
-    lag : angle between the two ends of the edge
+    `modes`: axis (0 or 1), natural frequency [Hz], damping ratio, mass [kg]
+    `windows`: (angle ahead of tooth 1, start, end, delay angle) of each tooth
+    `stiffness`, `rub`: tangential and radial, depth times K and depth times the viscous force per velocity
+    `edges`: angles of the steps from 0 to a period
+    `clock`: time of an angle
+    `lag`: angle between the two ends of the edge
     """
     n, m = edges.size - 1, len(modes)
     time, period = clock(edges), edges[-1]

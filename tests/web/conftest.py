@@ -64,16 +64,7 @@ def browser(launch: Callable[..., Browser]) -> Iterator[Browser]:
 
 @dataclass
 class Watch:
-    """What a page must not do.
-
-    Parameters
-    ----------
-    host : str
-        The only one that may be asked.
-    faults : list of str
-    requests : list
-        All requests, so that tests may look.
-    """
+    """What a page must not do. `host`: the only one that may be asked. `requests`: all requests, so that tests may look."""
 
     host: str
     faults: list[str] = field(default_factory=list)

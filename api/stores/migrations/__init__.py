@@ -26,10 +26,7 @@ _kept = Table(
 def version_of(connection: Connection) -> str:
     """Return the number of a store's newest revision; empty where there is no store yet.
 
-    Raises
-    ------
-    InputError
-        A later release has written it, or it has no number.
+    Raises `InputError`: a later release has written it, or it has no number.
     """
     there = inspect(connection)
     if there.has_table(_kept.name):

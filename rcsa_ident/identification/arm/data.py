@@ -30,25 +30,17 @@ Axial = Callable[[int, np.ndarray], tuple[ComplexArray, ComplexArray]]
 class PosedData:
     """Points of a campaign on a robot: each is one tooth-passing line of one cut, in X, in Y or in both.
 
-    Parameters
-    ----------
-    base : IdentificationData
-    teeth : array of int, shape (t,)
-        Of each tooling's cutter.
-    bodies : array, shape (c, b, 6, n) [sqrt(kg) m]
-        G of each body at each posture: G^T G is what it adds to the mass matrix of all freedoms, as heavy as the data sheet has it.
-    shapes : array, shape (c, n, 6)
-        What each freedom moves where the tool-holder sits, in the spindle's axes: t, lever r in X and in Y, along Z, lever times turn.
-    posture : array of int, shape (p,)
-        Of each point.
-    omega : array, shape (p,) [rad/s]
-    place : array of int, shape (p, 2)
-        The line of X and of Y that stands there, -1 where there is none.
-    force : complex array, shape (p, 3) [N]
-    slope : complex array, shape (p, 3, c) [-]
-        Change of the forces' logarithms with the uncertain coefficients.
-    flange, tip : complex arrays, shapes (p, 6, 6), (p, 6, 3) [m/N]
-        A22 and A21 of the cut's tooling, scaled by the lever.
+    `teeth`: array of int, shape (t,); of each tooling's cutter
+    `bodies` [sqrt(kg) m], shape (c, b, 6, n): G of each body at each posture: G^T G is what it adds to the mass matrix of all freedoms, as
+        heavy as the data sheet has it
+    `shapes`, shape (c, n, 6): what each freedom moves where the tool-holder sits, in the spindle's axes: t, lever r in X and in Y, along Z,
+        lever times turn
+    `posture`: array of int, shape (p,); of each point
+    `omega` [rad/s], shape (p,)
+    `place`: array of int, shape (p, 2); the line of X and of Y that stands there, -1 where there is none
+    `force` [N], shape (p, 3)
+    `slope` [-], shape (p, 3, c): change of the forces' logarithms with the uncertain coefficients
+    `flange`, `tip`: complex arrays, shapes (p, 6, 6), (p, 6, 3) [m/N]; A22 and A21 of the cut's tooling, scaled by the lever
     """
 
     base: IdentificationData
@@ -116,22 +108,12 @@ def posed_data(
 ) -> PosedData:
     """Return a campaign's points on a robot.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        Lines of X and Y, of the flange's own motion.
-    robot : FlexibleRobot
-    postures : array, shape (c, j) [rad]
-    of_cut : array of int, shape (k,)
-        Posture of each cut.
-    teeth : mapping of str to int
-        Of the toolings.
-    rods, axial : callables
-
-    Raises
-    ------
-    InputError
-        If the cuts do not tell the flange's motion along both axes.
+    `data`: lines of X and Y, of the flange's own motion
+    `postures` [rad], shape (c, j)
+    `of_cut`: array of int, shape (k,); posture of each cut
+    `teeth`: of the toolings
+    `rods`, `axial`: callables
+    Raises `InputError` if the cuts do not tell the flange's motion along both axes.
     """
     if data.sweeps:
         raise InputError("cuts", "passes whose speed changes", "cuts at one speed each, on a robot")
@@ -166,10 +148,7 @@ def posed_data(
 def check_postures(postures: Sequence[tuple[float, ...]], ids: Sequence[str], robot: RobotModel) -> tuple[FloatArray, np.ndarray]:
     """Return the postures of cuts, each once, and which of them each cut has; shapes (c, j) [rad], (k,).
 
-    Raises
-    ------
-    InputError
-        If a cut tells none, or one of another number of joints.
+    Raises `InputError` if a cut tells none, or one of another number of joints.
     """
     for id, posture in zip(ids, postures, strict=True):
         if len(posture) != len(robot.joints):

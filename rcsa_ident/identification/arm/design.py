@@ -46,13 +46,8 @@ _ROUNDED = 1e-5
 class Experiment:
     """What is measured at a posture, and about what.
 
-    Parameters
-    ----------
-    unknowns : tuple of str
-    prior : array, shape (p, p)
-        What is known before.
-    information : callable
-        From a posture (j,) [rad] to what its readings tell, shape (p, p).
+    `prior`, shape (p, p): what is known before
+    `information`: from a posture (j,) [rad] to what its readings tell, shape (p, p)
     """
 
     unknowns: tuple[str, ...]
@@ -65,13 +60,8 @@ def static_tests(robot: RobotModel, force: float, noise: float = REPEATABILITY) 
 
     Unknowns are the compliances of all freedoms and the plays of the drives, in units of what is believed of them.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    force : float [N]
-        The largest.
-    noise : float [m]
-        Scatter of a reading.
+    `force` [N]: the largest
+    `noise` [m]: scatter of a reading
     """
     positive("force", force, "N")
     positive("noise", noise, "m")
@@ -90,15 +80,8 @@ def encoders_at_rest(robot: RobotModel, noise: float = ENCODER) -> Experiment:
 
     Unknowns are the drives' compliances, in units of the file's, to which they are believed.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    noise : float [rad]
-
-    Raises
-    ------
-    InputError
-        If no masses are known.
+    `noise` [rad]
+    Raises `InputError` if no masses are known.
     """
     positive("encoder noise", noise, "rad")
     if not robot.weighed:
@@ -116,16 +99,8 @@ def natural_frequencies(robot: RobotModel, noise: float = FREQUENCY) -> Experime
 
     Unknowns are the compliances of all freedoms, in units of the file's, to which they are believed.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    noise : float
-        Scatter of a natural frequency as a share of it.
-
-    Raises
-    ------
-    InputError
-        If no masses are known.
+    `noise`: scatter of a natural frequency as a share of it
+    Raises `InputError` if no masses are known.
     """
     positive("frequency noise", noise, "share")
     arm, stiffness = FlexibleRobot(robot), robot.chain().stiffness
@@ -146,16 +121,8 @@ def stable_cuts(robot: RobotModel, noise: float = CUT_NOISE) -> Experiment:
     Unknowns are compliances, logarithms of dampers and of the masses of links and payload, in units of what is believed of them
     (`arm_priors`). Forces are those of half an immersion, fed along the tool's x; faster cuts tell the spindle, wherever they are made.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    noise : float
-        Share of each line that nothing explains.
-
-    Raises
-    ------
-    InputError
-        If no masses are known.
+    `noise`: share of each line that nothing explains
+    Raises `InputError` if no masses are known.
     """
     positive("cut noise", noise, "share")
     priors, chain, arm = arm_priors(robot), robot.chain(), FlexibleRobot(robot)
@@ -188,15 +155,8 @@ def stable_cuts(robot: RobotModel, noise: float = CUT_NOISE) -> Experiment:
 def payload_mass(robot: RobotModel, noise: float = ENCODER) -> Experiment:
     """Return readings of the same encoders that tell how much the payload weighs [kg], believed to its own size.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    noise : float [rad]
-
-    Raises
-    ------
-    InputError
-        If the robot carries none.
+    `noise` [rad]
+    Raises `InputError` if the robot carries none.
     """
     positive("encoder noise", noise, "rad")
     if robot.payload is None or robot.payload.mass <= 0.0:
@@ -212,12 +172,8 @@ def payload_mass(robot: RobotModel, noise: float = ENCODER) -> Experiment:
 class Reach:
     """Where an arm may be sent.
 
-    Parameters
-    ----------
-    robot : RobotModel
-        Within its joints' limits; half a turn either way where a joint has none.
-    box : pair of arrays, shape (3,) [m], or None
-        Lowest and highest place of the tool in the base's axes; None leaves it to the joints.
+    `robot`: within its joints' limits; half a turn either way where a joint has none
+    `box`: pair of arrays, shape (3,) [m], or None; lowest and highest place of the tool in the base's axes; None leaves it to the joints
     """
 
     robot: RobotModel
@@ -250,10 +206,7 @@ class Reach:
 
         Each is drawn, and stepped to a drawn place of the box by the joints that reach it with least turning.
 
-        Raises
-        ------
-        InputError
-            If the tool hardly ever gets there.
+        Raises `InputError` if the tool hardly ever gets there.
         """
         low, high = self.limits.T
         found: list[FloatArray] = []
@@ -285,12 +238,9 @@ class Reach:
 class PlannedPostures:
     """Postures, the most telling first.
 
-    Parameters
-    ----------
-    postures : array, shape (m, j) [rad]
-    information : array, shape (m, p, p)
-        What each tells.
-    prior : array, shape (p, p)
+    `postures` [rad], shape (m, j)
+    `information`, shape (m, p, p): what each tells
+    `prior`, shape (p, p)
     """
 
     postures: FloatArray
@@ -313,10 +263,7 @@ class PlannedPostures:
 def best_of(experiment: Experiment, candidates: FloatArray, count: int) -> PlannedPostures:
     """Return the postures out of some, shape (k, j) [rad], that tell most together.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than are wanted.
+    Raises `InputError` if there are fewer than are wanted.
     """
     if not 1 <= count <= len(candidates):
         raise InputError("count", count, f"1 to {len(candidates)}, as many postures as there are to choose from")
@@ -326,14 +273,7 @@ def best_of(experiment: Experiment, candidates: FloatArray, count: int) -> Plann
 def plan_postures(experiment: Experiment, reach: Reach, count: int, candidates: int, seed: int) -> PlannedPostures:
     """Return postures that tell most together, of all within reach: chosen among drawn ones, then each moved uphill in turn.
 
-    Parameters
-    ----------
-    experiment : Experiment
-    reach : Reach
-    count : int
-    candidates : int
-        Postures that are drawn.
-    seed : int
+    `candidates`: postures that are drawn
     """
     if not 1 <= count <= candidates:
         raise InputError("count", count, f"1 to {candidates}, as many postures as are drawn")

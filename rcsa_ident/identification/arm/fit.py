@@ -51,13 +51,8 @@ _FIRST_RESIDUAL = 0.5
 class ArmStart:
     """A fit of the arm alone, from one start; it answers with a `Candidate`.
 
-    Parameters
-    ----------
-    data : PosedData
-        Lines up to `ARM_BAND`, the flange's motion as the only output.
-    priors : ArmPriors
-    theta : array, shape (p,)
-        Where it begins, no mode of the spindle in it.
+    `data`: lines up to `ARM_BAND`, the flange's motion as the only output
+    `theta`, shape (p,): where it begins, no mode of the spindle in it
     """
 
     phase: ClassVar[Phase] = Phase.SEARCH
@@ -80,14 +75,8 @@ class ArmStart:
 class DrawnSpindles:
     """Spindles as they were drawn, on an arm that is known; it answers with the cost of each, shape (d,).
 
-    Parameters
-    ----------
-    data : PosedData
-        The flange's motion as the only output.
-    priors : ArmPriors
-    arm : Candidate
-    numbers : array, shape (d, 11)
-        As `spindle_starts.drawn` returns them.
+    `data`: the flange's motion as the only output
+    `numbers`, shape (d, 11): as `spindle_starts.drawn` returns them
     """
 
     phase: ClassVar[Phase] = Phase.COUPLED
@@ -137,21 +126,11 @@ def with_spindle(arm: Candidate, numbers: FloatArray) -> tuple[FloatArray, Posed
 def fit_robot(data: PosedData, priors: ArmPriors, seed: int, map: Map, report: Report) -> tuple[Solution, PosedMisfit, Solution]:
     """Return arm and spindle as the cuts tell them, the misfit whose minimum they are, and a rival with one mode more.
 
-    Parameters
-    ----------
-    data : PosedData
-        Of all outputs.
-    priors : ArmPriors
-    seed : int
-        Of the starts.
-    map : callable
-        The builtin, or a pool's.
-    report : callable of (stage, cost, solution)
-
-    Raises
-    ------
-    InputError
-        If no line is low enough to tell the arm.
+    `data`: of all outputs
+    `seed`: of the starts
+    `map`: the builtin, or a pool's
+    `report`: callable of (stage, cost, solution)
+    Raises `InputError` if no line is low enough to tell the arm.
     """
     data = data.at_harmonics(HARMONICS)
     summed = data.summed()

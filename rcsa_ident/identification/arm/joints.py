@@ -40,18 +40,11 @@ _BEYOND = 0.3
 class JointRecord:
     """A motion.
 
-    Parameters
-    ----------
-    name : str
-    step : float [s]
-    motor : array, shape (j, n) [rad]
-        Motors' angles over the gear ratios.
-    joint : array, shape (j, n) [rad]
-        Angles of the links.
-    torque : array, shape (j, n) [N m]
-        Motors' torques times the gear ratios.
-    motor_inertia : array, shape (j,) [kg m^2]
-        Times the squares of the gear ratios.
+    `step` [s]
+    `motor` [rad], shape (j, n): motors' angles over the gear ratios
+    `joint` [rad], shape (j, n): angles of the links
+    `torque` [N m], shape (j, n): motors' torques times the gear ratios
+    `motor_inertia` [kg m^2], shape (j,): times the squares of the gear ratios
     """
 
     name: str
@@ -76,21 +69,13 @@ class JointRecord:
 class JointFit:
     """What is known of the joints afterwards; NaN where a joint could not be fitted.
 
-    Parameters
-    ----------
-    stiffness : array, shape (j,) [N m/rad]
-    stiffness_share : array, shape (j,) [-]
-        Standard deviation as a share.
-    told : array of bool, shape (j,)
-        Whether the records tell the compliance from none.
-    lost_motion : array, shape (j,) [rad]
-        Half of what a link stays behind its motor when the speed turns.
-    coulomb, viscous : arrays, shape (j,) [N m, N m s/rad]
-        Friction in front of the spring.
-    delay, delay_spread : float [s]
-        How much later the joints' encoders are read.
-    weights : array, shape (j, 6)
-        Twist over torque, turn of the speed, speed, one, sine and cosine of the angle: what `explained` predicts with.
+    `stiffness` [N m/rad], shape (j,)
+    `stiffness_share` [-], shape (j,): standard deviation as a share
+    `told`: array of bool, shape (j,); whether the records tell the compliance from none
+    `lost_motion` [rad], shape (j,): half of what a link stays behind its motor when the speed turns
+    `coulomb`, `viscous` [N m, N m s/rad], shape (j,): friction in front of the spring
+    `delay`, `delay_spread` [s]: how much later the joints' encoders are read
+    `weights`, shape (j, 6): twist over torque, turn of the speed, speed, one, sine and cosine of the angle: what `explained` predicts with
     """
 
     stiffness: FloatArray
@@ -117,16 +102,8 @@ class JointFit:
 def fit_joints(robot: RobotModel, records: Sequence[JointRecord]) -> JointFit:
     """Return the joints' stiffnesses from motions.
 
-    Parameters
-    ----------
-    robot : RobotModel
-        Its stiffnesses are believed to their own size; of its links the lengths count, not the masses.
-    records : sequence of JointRecord
-
-    Raises
-    ------
-    InputError
-        If a record has another number of joints, or no joint can be fitted.
+    `robot`: its stiffnesses are believed to their own size; of its links the lengths count, not the masses
+    Raises `InputError` if a record has another number of joints, or no joint can be fitted.
     """
     count = len(robot.joints)
     for record in records:

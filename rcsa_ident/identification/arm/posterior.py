@@ -24,14 +24,7 @@ _SI = 1.0 / SCALE[:DIRECTIONS]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotUnknowns:
-    """Unknowns of a robot and of the joint in its spindle.
-
-    Parameters
-    ----------
-    theta : array, shape (p,)
-    layout : PosedLayout
-        Without forces and tooth angles.
-    """
+    """Unknowns of a robot and of the joint in its spindle. `theta`, shape (p,). `layout`: without forces and tooth angles."""
 
     theta: FloatArray
     layout: PosedLayout
@@ -64,18 +57,11 @@ class RobotUnknowns:
 class RobotPosterior:
     """Unknowns of a robot with their covariance.
 
-    Parameters
-    ----------
-    sheet : RobotModel
-        Lengths, masses, and what was believed of its springs.
-    tilts : bool
-        With the springs across the joints' axes.
-    best : RobotUnknowns
-    covariance : array, shape (p, p)
-    believed : array, shape (p,)
-        Standard deviations before any cut.
-    rivals : tuple of RobotUnknowns
-        Other models of the same data: how far they differ belongs to what is not known.
+    `sheet`: lengths, masses, and what was believed of its springs
+    `tilts`: with the springs across the joints' axes
+    `covariance`, shape (p, p)
+    `believed`, shape (p,): standard deviations before any cut
+    `rivals`: other models of the same data: how far they differ belongs to what is not known
     """
 
     sheet: RobotModel

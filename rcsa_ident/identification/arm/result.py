@@ -42,20 +42,11 @@ class RobotCode(RemarkCode):
 class RobotIdentification(Shown):
     """What was found of a robot.
 
-    Parameters
-    ----------
-    status : Status
-    reasons, notes : tuples of Remark
-        Reasons for doubt, and what the data cannot tell.
-    seed : int
-    posterior : RobotPosterior
-    model_error : tuple of float [-]
-        Share of the lines of X and of Y that neither model nor noise explains.
-    chi2_per_point : float [-]
-    cut_ids : tuple of str
-    postures : array, shape (c, j) [rad]
-        Of the cuts, each once.
-    band_hz : (float, float) [Hz]
+    `reasons`, `notes`: reasons for doubt, and what the data cannot tell
+    `model_error`: tuple of float [-], share of the lines of X and of Y that neither model nor noise explains
+    `chi2_per_point` [-]
+    `postures` [rad], shape (c, j): of the cuts, each once
+    `band_hz`: (float, float) [Hz]
     """
 
     status: Status
@@ -92,18 +83,7 @@ class RobotIdentification(Shown):
 def answer(
     sheet: RobotModel, tilts: bool, found: Solution, misfit: PosedMisfit, rival: Solution, seed: int, postures: FloatArray
 ) -> RobotIdentification:
-    """Return what a fit has found, and the doubts about it.
-
-    Parameters
-    ----------
-    sheet : RobotModel
-    tilts : bool
-    found, rival : Solution
-    misfit : PosedMisfit
-        The one whose minimum `found` is.
-    seed : int
-    postures : array, shape (c, j) [rad]
-    """
+    """Return what a fit has found, and the doubts about it. `misfit`: the one whose minimum `found` is. `postures` [rad], shape (c, j)."""
     covariance = np.linalg.inv(found.evaluation.hessian)
     layout, data = posed(found.layout), misfit.data
     own = layout.machine

@@ -46,22 +46,12 @@ _TOLD, _LEARNT, _TOGETHER = 2.0, 0.9, 0.5
 class StaticTests:
     """Forces on a robot that stands still, and how far it gives way.
 
-    Parameters
-    ----------
-    name : str
-    angles : array, shape (t, j) [rad]
-        In the order in which they were made; those with the same angles share the reading of the unloaded place.
-    force : array, shape (t, 6) [N, N m]
-        At the tool's place, in the base's axes: forces, then moments.
-    displacement : array, shape (t, 3) or (t, 6) [m, rad]
-        Of the measured point from where it is unloaded, in the base's axes; turns where they are measured.
-    point : array, shape (t, 3) [m], or None
-        The measured point in the robot's flange; None is the tool's place.
-
-    Raises
-    ------
-    InputError
-        If shapes differ, a number is not finite or nothing pushes.
+    `angles` [rad], shape (t, j): in the order in which they were made; those with the same angles share the reading of the unloaded place
+    `force` [N, N m], shape (t, 6): at the tool's place, in the base's axes: forces, then moments
+    `displacement`: array, shape (t, 3) or (t, 6) [m, rad]; of the measured point from where it is unloaded, in the base's axes; turns where
+        they are measured
+    `point` [m], shape (t, 3): the measured point in the robot's flange; None is the tool's place
+    Raises `InputError` if shapes differ, a number is not finite or nothing pushes.
     """
 
     name: str
@@ -92,18 +82,12 @@ class StaticTests:
 class StaticFit:
     """What static tests tell of an arm.
 
-    Parameters
-    ----------
-    robot : RobotModel
-        With the springs and plays that were found.
-    covariance : array, shape (n + j, n + j)
-        Of the compliances of all freedoms, in the order of the chain [rad/(N m)], and of the drives' plays [rad].
-    believed : array, shape (n + j,)
-        Standard deviations before the tests.
-    noise : tuple of two floats [m, rad]
-        Learnt scatter of the readings, of places and of turns; NaN where no turn was measured.
-    zero : float
-        Scatter of a posture's zero over that of a reading.
+    `robot`: with the springs and plays that were found
+    `covariance`, shape (n + j, n + j): of the compliances of all freedoms, in the order of the chain [rad/(N m)], and of the drives' plays
+        [rad]
+    `believed`, shape (n + j,): standard deviations before the tests
+    `noise`: tuple of two floats [m, rad]; learnt scatter of the readings, of places and of turns; NaN where no turn was measured
+    `zero`: scatter of a posture's zero over that of a reading
     """
 
     robot: RobotModel
@@ -155,16 +139,8 @@ def fit_static(robot: RobotModel, tests: Sequence[StaticTests]) -> StaticFit:
     The file's compliances are believed to their own size. The scatter of the readings and of the zeros is the one under which the tests
     are most likely, whatever the springs are (the evidence).
 
-    Parameters
-    ----------
-    robot : RobotModel
-        Its lengths and what weighs on its drives count; where it has no masses, play is taken as if no weight loaded it.
-    tests : sequence of StaticTests
-
-    Raises
-    ------
-    InputError
-        If tests have another number of joints.
+    `robot`: its lengths and what weighs on its drives count; where it has no masses, play is taken as if no weight loaded it
+    Raises `InputError` if tests have another number of joints.
 
     Examples
     --------
@@ -211,13 +187,8 @@ def fit_static(robot: RobotModel, tests: Sequence[StaticTests]) -> StaticFit:
 def expected_information(robot: RobotModel, tests: StaticTests, noise: float = REPEATABILITY, turns: float = TURNS) -> FloatArray:
     """Return what tests would tell of the compliances and plays, in units of what is believed of them, shape (n + j, n + j).
 
-    Parameters
-    ----------
-    robot : RobotModel
-    tests : StaticTests
-        What their displacements are does not matter.
-    noise, turns : float [m, rad]
-        Scatter of a reading of a place and of a turn; a zero's is the same.
+    `tests`: what their displacements are does not matter
+    `noise`, `turns` [m, rad]: scatter of a reading of a place and of a turn; a zero's is the same
     """
     spread = _beliefs(_parameters(robot), robot.freedoms())
     _, slopes, _ = _Pushed.of(robot, tests).whitened(np.zeros_like(spread), np.array([noise, turns]), 1.0)

@@ -37,12 +37,9 @@ _USUAL_DAMPING = 0.269
 class ArmPriors(Priors):
     """What is known of all freedoms of an arm before any cut, and of spindles.
 
-    Parameters
-    ----------
-    centre, spread : arrays, shape (2 n + b,)
-        Of the compliances' unknowns, of the logarithms of damping [N m s/rad] and of the bodies' masses over those of the data sheet.
-    springs : tuple of float, length n [N m/rad]
-        The data sheet's.
+    `centre`, `spread`, shape (2 n + b,): of the compliances' unknowns, of the logarithms of damping [N m s/rad] and of the bodies' masses
+        over those of the data sheet
+    `springs`: tuple of float, length n [N m/rad]; the data sheet's
     """
 
     centre: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -67,12 +64,8 @@ def arm_priors(robot: RobotModel, tilts: bool = True) -> ArmPriors:
 class ArmBlock:
     """An arm: compliance over the data sheet's (n), log damping (n), logarithms of the masses over the data sheet's (b).
 
-    Parameters
-    ----------
-    freedoms : int
-        Joints and tilts.
-    masses : int
-        Of links and payload; with a mass goes its inertia.
+    `freedoms`: joints and tilts
+    `masses`: of links and payload; with a mass goes its inertia
     """
 
     freedoms: int
@@ -104,16 +97,10 @@ class ArmBlock:
 class PosedLayout(Unknowns):
     """Which unknown of a robot stands where in the vector.
 
-    Parameters
-    ----------
-    springs : tuple of float, length n [N m/rad]
-        The data sheet's stiffness of the arm's freedoms, joints and tilts.
-    masses : int
-        Of links and payload.
-    modes : int
-        Of the spindle.
-    coefficients, clampings : int
-        As in `unknowns.Layout`.
+    `springs`: tuple of float, length n [N m/rad]; the data sheet's stiffness of the arm's freedoms, joints and tilts
+    `masses`: of links and payload
+    `modes`: of the spindle
+    `coefficients`, `clampings`: as in `unknowns.Layout`
     """
 
     springs: tuple[float, ...]
@@ -152,13 +139,9 @@ class PosedLayout(Unknowns):
 class RobotParameters:
     """A robot in physical units.
 
-    Parameters
-    ----------
-    stiffness, damping : arrays, shape (n,) [N m/rad], [N m s/rad]
-    heavier : array, shape (b,) [-]
-        Masses over those of the data sheet.
-    spindle : ModalParameters
-        On a held housing.
+    `stiffness`, `damping`: arrays, shape (n,) [N m/rad], [N m s/rad]
+    `heavier` [-], shape (b,): masses over those of the data sheet
+    `spindle`: on a held housing
     """
 
     stiffness: FloatArray

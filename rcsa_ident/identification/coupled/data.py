@@ -19,20 +19,13 @@ _SCALE = np.array([1.0, LEVER])
 class CoupledData:
     """Points of a campaign: each is one tooth-passing line of one cut, in X, in Y or in both.
 
-    Parameters
-    ----------
-    base : IdentificationData
-        Lines of X and Y, with the other axis' share in their power.
-    omega, speed, relative_speed : arrays, shape (p,) [rad/s], [rad/s], [-]
-    place : array of int, shape (p, 2)
-        The line of X and of Y that stands there, -1 where there is none.
-    force : complex array, shape (p, 2) [N]
-        Simulated, along X and Y.
-    slope : complex array, shape (p, 2, c) [-]
-        Change of the forces' logarithms with the uncertain coefficients.
-    flange, tip : complex arrays, shapes (3, p, 4, 4), (3, p, 4, 2) [m/N]
-        A22 and A21 of the cut's tooling over both planes, scaled by the lever: without gyroscopic moments, with them, and with them
-        for a spindle that turns the other way (index 0, 1, -1).
+    `base`: lines of X and Y, with the other axis' share in their power
+    `omega`, `speed`, `relative_speed`: arrays, shape (p,) [rad/s], [rad/s], [-]
+    `place`: array of int, shape (p, 2); the line of X and of Y that stands there, -1 where there is none
+    `force` [N], shape (p, 2): simulated, along X and Y
+    `slope` [-], shape (p, 2, c): change of the forces' logarithms with the uncertain coefficients
+    `flange`, `tip`: complex arrays, shapes (3, p, 4, 4), (3, p, 4, 2) [m/N]; A22 and A21 of the cut's tooling over both planes, scaled by
+        the lever: without gyroscopic moments, with them, and with them for a spindle that turns the other way (index 0, 1, -1)
     """
 
     base: IdentificationData
@@ -63,13 +56,7 @@ def couplable(data: IdentificationData) -> bool:
 
 
 def coupled_data(data: IdentificationData) -> CoupledData:
-    """Return a campaign's points; the tool-holders are asked what they do while they turn.
-
-    Parameters
-    ----------
-    data : IdentificationData
-        For which `couplable` holds.
-    """
+    """Return a campaign's points; the tool-holders are asked what they do while they turn. `data`: for which `couplable` holds."""
     x, y = data.axes
     key = [(axis.cut * 2**20 + np.rint(axis.order).astype(np.int64)) for axis in data.axes]
     points = np.unique(np.concatenate(key))

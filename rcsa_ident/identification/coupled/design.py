@@ -35,13 +35,9 @@ def coupled_information(data: IdentificationData, posterior: CoupledPosterior, m
 
     Unknowns: the posterior's directions, its rivals, then the uncertain coefficients of the forces, which all cuts share.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        Cuts from `experiment_design.expected_cut` with lines of X and Y, and tool-holders that turn; what the lines hold does not matter.
-    posterior : CoupledPosterior
-    model_error : mapping of Dof to float
-        Share of each line that neither model nor noise explains; at least `LEAST_MODEL_ERROR`.
+    `data`: cuts from `experiment_design.expected_cut` with lines of X and Y, and tool-holders that turn; what the lines hold does not
+        matter
+    `model_error`: share of each line that neither model nor noise explains; at least `LEAST_MODEL_ERROR`
     """
     best, spread = posterior.best, np.asarray(data.coefficient_spread)
     shares = tuple(max(model_error[axis.axis], LEAST_MODEL_ERROR) for axis in data.axes)

@@ -45,15 +45,9 @@ Apart = tuple[FloatArray, Layout, FloatArray]
 class CoupledSearch:
     """What a start has come to.
 
-    Parameters
-    ----------
-    candidate : Candidate
-    evidence : float [-]
-        Minus twice the log evidence.
-    model_error : tuple of float [-]
-        Share of each axis' lines that counts as unexplained.
-    cut_weight : array, shape (k,)
-        Factor on the weights of each cut's lines.
+    `evidence` [-]: minus twice the log evidence
+    `model_error`: tuple of float [-], share of each axis' lines that counts as unexplained
+    `cut_weight`, shape (k,): factor on the weights of each cut's lines
     """
 
     candidate: Candidate
@@ -66,19 +60,12 @@ class CoupledSearch:
 class CoupledStart:
     """A polish of both planes as one machine, from what they have come to as two; it answers with a `CoupledSearch`.
 
-    Parameters
-    ----------
-    data : CoupledData
-        With the flange's motion as the only output.
-    priors : Priors
-    apart : (array, Layout, array)
-        Where it begins: unknowns of planes without fixture and tooth angles, their layout, the cuts' delays and angles.
-    weight : array, shape (k,)
-        Factor on each cut's weights.
-    turning : int
-        As in `CoupledLayout`; where it is not 0 there is gyroscopic coupling.
-    softening : bool
-        Whether the stiffness changes with the spindle's speed.
+    `data`: with the flange's motion as the only output
+    `apart`: (array, Layout, array); where it begins: unknowns of planes without fixture and tooth angles, their layout, the cuts' delays
+        and angles
+    `weight`, shape (k,): factor on each cut's weights
+    `turning`: as in `CoupledLayout`; where it is not 0 there is gyroscopic coupling
+    `softening`: whether the stiffness changes with the spindle's speed
     """
 
     phase: ClassVar[Phase] = Phase.COUPLED
@@ -110,12 +97,7 @@ class CoupledStart:
 class CoupledWalk:
     """The way of a start to its own noise, its sense of rotation and as many modes as the evidence asks for; it answers as a start does.
 
-    Parameters
-    ----------
-    data : CoupledData
-        With the flange's motion as the only output.
-    priors : Priors
-    start : CoupledSearch
+    `data`: with the flange's motion as the only output
     """
 
     phase: ClassVar[Phase] = Phase.COUPLED
@@ -169,18 +151,10 @@ def coupled_starts(
     Each plane's own search has bent its modes to explain the other one's forces; the fit of both apart has one joint, but has bent them
     further. What changes with speed may be the stiffness, or gyroscopic moments alone.
 
-    Parameters
-    ----------
-    data : CoupledData
-    priors : Priors
-    searched : list of AxisSearch
-        Of X and of Y.
-    apart : Candidate
-        Of both planes as if they did not feel each other.
-    weight : array, shape (k,)
-        Factor on each cut's weights there.
-    map : callable
-        The builtin, or a pool's.
+    `searched`: of X and of Y
+    `apart`: of both planes as if they did not feel each other
+    `weight`, shape (k,): factor on each cut's weights there
+    `map`: the builtin, or a pool's
     """
     summed = data.summed()
     of_searches, of_fit = _side_by_side(summed, searched), _flange_alone(apart)
@@ -221,14 +195,9 @@ def fit_coupled(data: CoupledData, priors: Priors, best: CoupledSearch, report: 
     A whole machine's modes reach across both planes: one more than the evidence asks for is worse as an answer, but how far it differs
     belongs to what is not known.
 
-    Parameters
-    ----------
-    data : CoupledData
-        With both outputs where they were recorded.
-    priors : Priors
-    best : CoupledSearch
-        Where it begins: the first of `coupled_starts`.
-    report : callable of (stage, cost, solution)
+    `data`: with both outputs where they were recorded
+    `best`: where it begins: the first of `coupled_starts`
+    `report`: callable of (stage, cost, solution)
     """
 
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:

@@ -44,14 +44,7 @@ class Points(Protocol):
 
 
 class SharedMisfit(Misfit):
-    """The residual where one machine answers the forces along all axes.
-
-    Parameters
-    ----------
-    data : Points
-    priors, model_error, cut_weight
-        As in `Misfit`.
-    """
+    """The residual where one machine answers the forces along all axes. `priors`, `model_error`, `cut_weight`: as in `Misfit`."""
 
     def __init__(self, data: Points, priors: Priors, model_error: tuple[float, ...], cut_weight: FloatArray | None = None) -> None:
         super().__init__(data.base, priors, model_error, cut_weight)
@@ -158,12 +151,8 @@ def _block(layout: Unknowns) -> ModalBlock:
 def compliance_of(felt: ComplexArray, moved: ComplexArray, factor: ComplexArray) -> ComplexArray:
     """Return the lines' change with the flange's symmetric receptance, its upper triangle by rows, shape (n, o, 10).
 
-    Parameters
-    ----------
-    felt, moved : complex arrays, shapes (n, o, 4), (n, 4)
-        v and x of a line's change v^T dB x.
-    factor : complex array, shape (n,)
-        On each line.
+    `felt`, `moved`: complex arrays, shapes (n, o, 4), (n, 4); v and x of a line's change v^T dB x
+    `factor`, shape (n,): on each line
     """
     rows, cols = np.triu_indices(DIRECTIONS)
     both = felt[:, :, :, None] * moved[:, None, None, :]

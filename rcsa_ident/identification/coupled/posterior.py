@@ -29,11 +29,8 @@ OWN_SHARE = 0.1
 class CoupledUnknowns:
     """Unknowns of a whole machine's flange and of the joint.
 
-    Parameters
-    ----------
-    theta : array, shape (p,)
-    layout : CoupledLayout
-        Of a flange: without fixture, forces and tooth angles.
+    `theta`, shape (p,)
+    `layout`: of a flange: without fixture, forces and tooth angles
     """
 
     theta: FloatArray
@@ -82,15 +79,10 @@ class CoupledUnknowns:
 class CoupledPosterior:
     """Unknowns of both planes with their covariance.
 
-    Parameters
-    ----------
-    best : CoupledUnknowns
-        The most probable ones.
-    covariance : array, shape (p, p)
-    speed_range : (float, float) [rad/s]
-        Middle of the campaign's spindle speeds and half their range.
-    rivals : tuple of CoupledUnknowns
-        Other models of the same data: how far they differ belongs to what is not known.
+    `best`: the most probable ones
+    `covariance`, shape (p, p)
+    `speed_range`: (float, float) [rad/s]; middle of the campaign's spindle speeds and half their range
+    `rivals`: other models of the same data: how far they differ belongs to what is not known
     """
 
     best: CoupledUnknowns

@@ -20,14 +20,10 @@ STRIKES = 6.0
 class Coupling:
     """What a step across the planes would take from the misfit.
 
-    Parameters
-    ----------
-    score : float [-]
-        By how many standard deviations it is more than chance gives.
-    oblique, gyroscopic : float [-]
-        The same for what is felt across in phase (shapes, damping, residual), and for the gyroscopic coupling, each alone.
-    explained : float [-]
-        Share of the lines' misfit that all of it would take away.
+    `score` [-]: by how many standard deviations it is more than chance gives
+    `oblique`, `gyroscopic` [-]: the same for what is felt across in phase (shapes, damping, residual), and for the gyroscopic coupling,
+        each alone
+    `explained` [-]: share of the lines' misfit that all of it would take away
     """
 
     score: float
@@ -44,14 +40,9 @@ class Coupling:
 def coupled_start(theta: FloatArray, layout: Layout, skew: int = 0, turning: int = 0) -> tuple[FloatArray, CoupledLayout]:
     """Return a vector of two planes that feel nothing of each other as one of a whole machine.
 
-    Parameters
-    ----------
-    theta : array, shape (p,)
-        Of X and Y.
-    layout : Layout
-        Of both, with as many outputs each.
-    skew, turning : int
-        As in `CoupledLayout`.
+    `theta`, shape (p,): of X and Y
+    `layout`: of both, with as many outputs each
+    `skew`, `turning`: as in `CoupledLayout`
     """
     axes = [unpack(theta[layout.axis(i)], part) for i, part in enumerate(layout.axes)]
     fixture, softening = (all(getattr(part, name) for part in layout.axes) for name in ("places", "softening"))
@@ -67,15 +58,9 @@ def coupling(theta: FloatArray, layout: Layout, nuisance: FloatArray, misfit: Co
     T = g_c^T (H_cc - H_cu H_uu^-1 H_uc)^-1 g_c is what one step would gain; by chance it is e, the trace of the data's share of that
     information, with a variance of 2 e.
 
-    Parameters
-    ----------
-    theta : array, shape (p,)
-        The optimum of both planes apart.
-    layout : Layout
-    nuisance : array, shape (k, 2)
-        The cuts' delays and angles there.
-    misfit : CoupledMisfit
-        With the noise that was learned there.
+    `theta`, shape (p,): the optimum of both planes apart
+    `nuisance`, shape (k, 2): the cuts' delays and angles there
+    `misfit`: with the noise that was learned there
     """
     modes_x = layout.axes[0].modes
     vector, coupled = coupled_start(theta, layout, EVERY_PAIR)

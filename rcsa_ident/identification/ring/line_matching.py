@@ -30,14 +30,9 @@ _DAMPING = 0.15
 class Heard:
     """One line, or both planes' lines of one mode.
 
-    Parameters
-    ----------
-    omega, omega_std : float [rad/s]
-        The planes' mean.
-    damping, damping_std : float [-]
-    level : float [-]
-    split : float [-]
-        By what share the planes differ; 0 of a line alone.
+    `omega`, `omega_std` [rad/s]: the planes' mean
+    `damping`, `damping_std` [-]; `level` [-]
+    `split` [-]: by what share the planes differ; 0 of a line alone
     """
 
     omega: float
@@ -52,16 +47,10 @@ class Heard:
 class Predicted:
     """What is expected of the bending modes.
 
-    Parameters
-    ----------
-    mean : array, shape (2 k,)
-        Logarithms of the frequencies [rad/s], then of the damping ratios.
-    covariance : array, shape (2 k, 2 k)
-        Of what the drawing does not tell.
-    model : array, shape (k,)
-        Own error of the computed frequencies, as a share.
-    damping : bool
-        Whether damping is compared.
+    `mean`, shape (2 k,): logarithms of the frequencies [rad/s], then of the damping ratios
+    `covariance`, shape (2 k, 2 k): of what the drawing does not tell
+    `model`, shape (k,): own error of the computed frequencies, as a share
+    `damping`: whether damping is compared
     """
 
     mean: FloatArray
@@ -82,11 +71,7 @@ class Match:
 def gathered(lines: Sequence[RingingMode], teeth: int) -> tuple[Heard, ...]:
     """Return lines in ascending order, both planes of a bending mode as one.
 
-    Parameters
-    ----------
-    lines : sequence of RingingMode
-    teeth : int
-        Of the cutter: its planes are alike with three and more.
+    `teeth`: of the cutter: its planes are alike with three and more
     """
     apart = _PLANES if teeth > 2 else _PLANES_OF_TWO
     found: list[Heard] = []
@@ -115,15 +100,9 @@ def gathered(lines: Sequence[RingingMode], teeth: int) -> tuple[Heard, ...]:
 def matched(predicted: Predicted, lines: Sequence[Heard], rods: Sequence[FreeMode], reach: float) -> Match | None:
     """Return the assignment with the largest evidence, or None where no line is heard.
 
-    Parameters
-    ----------
-    predicted : Predicted
-    lines : sequence of Heard
-        Ascending.
-    rods : sequence of FreeMode
-        Axial and torsional ones.
-    reach : float
-        Standard deviation of these, as a share.
+    `lines`: ascending
+    `rods`: axial and torsional ones
+    `reach`: standard deviation of these, as a share
     """
     if not lines:
         return None

@@ -58,16 +58,10 @@ _PER_GROUP = {
 class RungLine:
     """A line that was heard, and what it is.
 
-    Parameters
-    ----------
-    bare : bool
-        Of the tool alone.
-    heard : Heard
-    mode : FreeMode or None
-        As drawn; None where it is none of the modes.
-    after : float or None [rad/s]
-        The same mode's frequency after learning.
-    damping_after : float or None [-]
+    `bare`: of the tool alone
+    `mode`: as drawn; None where it is none of the modes
+    `after` [rad/s]: the same mode's frequency after learning
+    `damping_after` [-]
     """
 
     bare: bool
@@ -150,21 +144,11 @@ class _Observed:
 def learned(tooling: Tooling, heard: RingDown | None, bare_tool: RingDown | None = None, mass: float | None = None) -> RungTooling:
     """Return what rings of a tooling, of its tool alone and the tool's mass tell together.
 
-    Parameters
-    ----------
-    tooling : Tooling
-        As drawn; one without a spread is taken as an honest drawing.
-    heard : RingDown or None
-        Of the tool in its holder, hanging free.
-    bare_tool : RingDown or None
-        Of the tool alone.
-    mass : float or None [kg]
-        Of the tool alone.
-
-    Raises
-    ------
-    InputError
-        Nothing was heard of it, it is another tool that rings, or the mass is another tool's.
+    `tooling`: as drawn; one without a spread is taken as an honest drawing
+    `heard`: of the tool in its holder, hanging free
+    `bare_tool`: of the tool alone
+    `mass` [kg]: of the tool alone
+    Raises `InputError`: nothing was heard of it, it is another tool that rings, or the mass is another tool's.
     """
     remarks = []
     if tooling.spread.exact:

@@ -49,14 +49,9 @@ def write_tap(path: str | Path, found: TapFrf) -> None:
 def write_receptances_uff(path: str | Path, receptances: Mapping[str, Receptance], title: str, binary: bool = False) -> None:
     """Write every entry of receptances as a frequency response function; node 1 is the tip, node 2 the flange.
 
-    Parameters
-    ----------
-    path : path
-    receptances : mapping of axis (X or Y, or both as XY) to Receptance
-    title : str
-        Written into each header.
-    binary : bool
-        Dataset 58b.
+    `receptances`: mapping of axis (X or Y, or both as XY) to Receptance
+    `title`: written into each header
+    `binary`: dataset 58b
     """
     functions = [
         UffFunction(
@@ -98,12 +93,8 @@ def named_entries(receptances: Mapping[str, Receptance]) -> dict[str, ComplexArr
 def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance], further: Mapping[str, FloatArray] | None = None) -> None:
     """Write FRF.csv with all entries: motion per force first, as every reader of FRF.csv wants it.
 
-    Parameters
-    ----------
-    path : path
-    receptances : mapping of axis (X or Y, or both as XY) to Receptance
-    further : mapping of column name to array, shape (n,), optional
-        Columns behind them.
+    `receptances`: mapping of axis (X or Y, or both as XY) to Receptance
+    `further`: mapping of column name to array, shape (n,); columns behind them
     """
     entries = named_entries(receptances)
     frequency = to_hz(next(iter(receptances.values())).omega)
@@ -116,14 +107,7 @@ def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance
 
 
 def write_receptances_json(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
-    """Write every entry as lists of real and imaginary parts.
-
-    Parameters
-    ----------
-    path : path
-    receptances : mapping of axis (X or Y, or both as XY) to Receptance
-    title : str
-    """
+    """Write every entry as lists of real and imaginary parts. `receptances`: mapping of axis (X or Y, or both as XY) to Receptance."""
     frequency = to_hz(next(iter(receptances.values())).omega)
     entries = {name: {"re": v.real.tolist(), "im": v.imag.tolist()} for name, v in named_entries(receptances).items()}
     data = {"title": title, "units": _UNITS, "frequency_hz": frequency.tolist(), "receptances": entries}
@@ -136,11 +120,7 @@ _UNITS = {"X, Y": "m/N", "tM": "m/(N m)", "rF": "rad/N", "rM": "rad/(N m)"}
 def write_receptances_hdf5(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
     """Write every entry as a complex dataset beside ``frequency_hz``.
 
-    Parameters
-    ----------
-    path : path
-    receptances : mapping of axis (X or Y, or both as XY) to Receptance
-    title : str
+    `receptances`: mapping of axis (X or Y, or both as XY) to Receptance
     """
     import h5py
 
@@ -180,12 +160,8 @@ def _directions(model: ModalModel) -> Sequence[float | None]:
 def write_modes(path: str | Path, axes: Mapping[str, ModalModel], as_json: bool) -> None:
     """Write modes as CSV or JSON: h_pq = sum phi_p phi_q / (i omega - lambda) + its mirror.
 
-    Parameters
-    ----------
-    path : path
-    axes : mapping of axis (X or Y, or both as XY) to ModalModel
-    as_json : bool
-        JSON, else CSV.
+    `axes`: mapping of axis (X or Y, or both as XY) to ModalModel
+    `as_json`: JSON, else CSV
     """
     records: Sequence[dict[str, Any]] = mode_records(axes)
     if not records:

@@ -42,18 +42,12 @@ def write_flange_csv(
 ) -> None:
     """Write flange receptances: ``frequency_hz, X_tF_re, X_tF_im, X_tM_re, ..., Y_rM_im`` in m/N, rad/N and rad/(N m).
 
-    Parameters
-    ----------
-    path : path
-    frequency_hz : array, shape (n,)
-    values : mapping of Dof to complex array, shape (n, 2, 2)
-    std : mapping of Dof to array, shape (n, 2, 2), optional
-        Columns ``X_tF_std`` and so on: of the real and of the imaginary part each.
-    joints : mapping of Dof to LumpedJoint, optional
-        Columns ``X_joint_translational_stiffness`` and so on [N/m, N m/rad, N s/m, N m s/rad], of the joint in front of `values`; an axis
-        without them has its joint's compliance in `values`.
-    axial : complex array, shape (n,), optional
-        Columns ``Z_tF_re`` and ``Z_tF_im``: along the axis, with the joint's compliance in it.
+    `frequency_hz`, shape (n,)
+    `values`: mapping of Dof to complex array, shape (n, 2, 2)
+    `std`: mapping of Dof to array, shape (n, 2, 2); columns ``X_tF_std`` and so on: of the real and of the imaginary part each
+    `joints`: columns ``X_joint_translational_stiffness`` and so on [N/m, N m/rad, N s/m, N m s/rad], of the joint in front of `values`; an
+        axis without them has its joint's compliance in `values`
+    `axial`, shape (n,): columns ``Z_tF_re`` and ``Z_tF_im``: along the axis, with the joint's compliance in it
     """
     columns: dict[str, FloatArray] = {"frequency_hz": np.asarray(frequency_hz, dtype=float)}
     for axis, block in values.items():
@@ -76,10 +70,7 @@ def write_flange_csv(
 def write_flange_machine(path: str | Path, machine: FlangeMachine) -> None:
     """Write the flange of a machine, and the joint in front of it where there is one apart from it.
 
-    Raises
-    ------
-    InputError
-        If its bending planes feel each other: the file has no columns for that.
+    Raises `InputError` if its bending planes feel each other: the file has no columns for that.
     """
     omega, values, joints = machine.lines(), {}, {}
     for part in machine.parts:
@@ -96,10 +87,7 @@ def write_flange_machine(path: str | Path, machine: FlangeMachine) -> None:
 def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
     """Return the flange of each axis in a file, without the joint that may stand in front of it; further columns are left alone.
 
-    Raises
-    ------
-    InputError
-        A column is missing, or the frequencies do not rise.
+    Raises `InputError`: a column is missing, or the frequencies do not rise.
     """
     return _flanges(read_table(path, "flange"))
 
@@ -107,10 +95,7 @@ def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
 def read_flange_machine(path: str | Path) -> FlangeMachine:
     """Return a machine that is known by the flange of such a file, with its joint; without one the flange holds the joint's compliance.
 
-    Raises
-    ------
-    InputError
-        As `read_flange_csv`; or the columns of a joint are not complete, or change from line to line.
+    Raises `InputError` as `read_flange_csv`; or the columns of a joint are not complete, or change from line to line.
     """
     return _machine(read_table(path, "flange"), Path(path).stem)
 

@@ -26,12 +26,8 @@ AXES = ("X", "Y")
 def write_forces_csv(path: str | Path, time: ArrayLike, force: Mapping[str, ArrayLike], deviation: Mapping[str, ArrayLike]) -> None:
     """Write forces [N] of axes X, Y or both over time [s], standard deviations in further columns; numbers read back exactly.
 
-    Parameters
-    ----------
-    path : path
-    time : array, shape (n,)
-        Rising.
-    force, deviation : mappings of axis to array, shape (n,)
+    `time`, shape (n,): rising
+    `force`, `deviation`: mappings of axis to array, shape (n,)
     """
     where = str(path)
     names = [axis for axis in AXES if axis in force]
@@ -98,12 +94,8 @@ def read_forces(path: str | Path) -> ForceEstimate:
 def sensors_of_result(data: Mapping[str, Any], where: str) -> tuple[Sensor, ...]:
     """Return the sensors of the campaign that a result came from.
 
-    Parameters
-    ----------
-    data : mapping
-        The result as `read_result` returns it.
-    where : str
-        The file, for the messages.
+    `data`: the result as `read_result` returns it
+    `where`: the file, for the messages
     """
     tables = Table(data, where).named_tables("sensors")
     sensors = tuple(sensor_of(name, table.data, where) for name, table in tables.items())

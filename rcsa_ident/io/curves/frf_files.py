@@ -43,22 +43,13 @@ _LARGEST = 128 * MEGABYTE
 class TapTest(NamedTuple):
     """A receptance from a file.
 
-    Parameters
-    ----------
-    frequency : array, shape (n,) [Hz]
-    values : complex array, shape (n,) [m/N]
-    response, force : str
-        Axis X, Y or Z (empty where the file says none).
-    record : int
-        Number in the file, from 1.
-    point : str
-        What the file calls the two places, as ``1 / 1``.
-    where : str
-        File and line.
-    remarks : tuple of Remark
-        What the file does not state and was assumed.
-    told : bool
-        Whether the file or the user says which quantity it is.
+    `frequency` [Hz], shape (n,); `values` [m/N], shape (n,)
+    `response`, `force`: axis X, Y or Z (empty where the file says none)
+    `record`: number in the file, from 1
+    `point`: what the file calls the two places, as ``1 / 1``
+    `where`: file and line
+    `remarks`: what the file does not state and was assumed
+    `told`: whether the file or the user says which quantity it is
     """
 
     frequency: FloatArray
@@ -75,15 +66,9 @@ class TapTest(NamedTuple):
 class Source(NamedTuple):
     """A file to take a tip's FRFs from.
 
-    Parameters
-    ----------
-    path : Path
-    pair : (str, str) or None
-        Axes of response and force; None takes what the file names.
-    record : int or None
-        Number in the file, from 1.
-    correction : Correction
-        Of what the file holds.
+    `pair`: (str, str) or None; axes of response and force; None takes what the file names
+    `record`: number in the file, from 1
+    `correction`: of what the file holds
     """
 
     path: Path
@@ -95,18 +80,9 @@ class Source(NamedTuple):
 def read_tap_tests(sources: Sequence[Source], units: str | None = None, from_hz: float = 0.0) -> dict[tuple[str, str], MeasuredCurve]:
     """Return the tip's FRFs for each pair of axes (response, force); those that no tip can have are turned or remarked.
 
-    Parameters
-    ----------
-    sources : sequence of Source
-    units : str or None
-        Of universal files and text columns, whatever they say themselves; None believes them, and takes m/N where a text says nothing.
-    from_hz : float [Hz]
-        Lines below it are left out: an accelerometer's drift over the square of the frequency is no receptance.
-
-    Raises
-    ------
-    InputError
-        Names the file and the line or the record.
+    `units`: of universal files and text columns, whatever they say themselves; None believes them, and takes m/N where a text says nothing
+    `from_hz` [Hz]: lines below it are left out: an accelerometer's drift over the square of the frequency is no receptance
+    Raises `InputError`, which names the file and the line or the record.
     """
     found: dict[tuple[str, str], MeasuredCurve] = {}
     for source in sources:
@@ -164,11 +140,7 @@ def read_frfs(path: str | Path, units: str | None = None) -> list[TapTest]:
 def parse_units(text: str, field: str = "unit", where: str = "") -> FrfUnit:
     """Return the unit of an FRF, such as ``(m/s^2)/N``, ``mm/N`` or ``N/m``.
 
-    Parameters
-    ----------
-    text : str
-    field, where : str
-        What the text is and where it stands, for the message.
+    `field`, `where`: what the text is and where it stands, for the message
     """
     unit = frf_unit(text)
     if unit is None:

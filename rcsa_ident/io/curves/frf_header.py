@@ -68,24 +68,14 @@ _DELIMITERS = ("\t", ";", ",", "  ")
 class Column:
     """A column of an FRF's table.
 
-    Parameters
-    ----------
-    role : str
-        One of `ROLES`.
-    told : str
-        As the header says it.
-    unit : FrfUnit or None
-        Of a part of the FRF; None where the column says none.
-    factor : float or None
-        Hertz or radians per unit; None where the column says none.
-    decibel : float or None
-        What 0 dB is, in the unit; None of linear numbers.
-    axis : str
-        X of a direct FRF, XY of one with the force in Y; empty where the name says none.
-    sign : float
-        -1 of a column that is called minus something.
-    quantities : tuple of str
-        That the name says.
+    `role`: one of `ROLES`
+    `told`: as the header says it
+    `unit`: of a part of the FRF; None where the column says none
+    `factor`: Hertz or radians per unit; None where the column says none
+    `decibel`: what 0 dB is, in the unit; None of linear numbers
+    `axis`: X of a direct FRF, XY of one with the force in Y; empty where the name says none
+    `sign`: -1 of a column that is called minus something
+    `quantities`: that the name says
     """
 
     role: str
@@ -102,19 +92,11 @@ class Column:
 class Header:
     """What the header says.
 
-    Parameters
-    ----------
-    columns : tuple of Column
-    named : bool
-        Whether the header names them; else they are frequency, real and imaginary part.
-    unit : FrfUnit or None
-        Of the file as a whole.
-    quantities : tuple of str
-        That the lines above the names say.
-    hertz : float or None
-        Per unit of the frequency, where a line above the names says it.
-    conjugated : bool
-        Time runs as e^{-iωt}.
+    `named`: whether the header names them; else they are frequency, real and imaginary part
+    `unit`: of the file as a whole
+    `quantities`: that the lines above the names say
+    `hertz`: per unit of the frequency, where a line above the names says it
+    `conjugated`: time runs as e^{-iωt}
     """
 
     columns: tuple[Column, ...]
@@ -128,21 +110,11 @@ class Header:
 def read_header(lines: Sequence[str], tail: str, width: int, where: str) -> Header:
     """Return what the lines above the numbers say.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        In front of the numbers.
-    tail : str
-        Words behind the first line of numbers, as MetalMAX writes them.
-    width : int
-        Number of columns.
-    where : str
-        The file, for the messages.
-
-    Raises
-    ------
-    InputError
-        Names what is said and not understood.
+    `lines`: in front of the numbers
+    `tail`: words behind the first line of numbers, as MetalMAX writes them
+    `width`: number of columns
+    `where`: the file, for the messages
+    Raises `InputError`, which names what is said and not understood.
     """
     above = [line for line in lines if re.search(r"\w", line)]
     columns = _of_tail(tail, width, where) if tail.strip() else None

@@ -32,18 +32,11 @@ _NAMES = {(0, False): "receptance", (1, False): "mobility", (2, False): "acceler
 class TextFrf(NamedTuple):
     """An FRF of a text.
 
-    Parameters
-    ----------
-    frequency : array, shape (n,) [Hz]
-    values : complex array, shape (n,)
-        In the unit, with time as e^{+iωt}.
-    unit : FrfUnit
-    axis : str
-        X of a direct one, XY of one with the force in Y; empty where the file says none.
-    told : bool
-        Whether the file or the user says which quantity it is.
-    remarks : tuple of Remark
-        What the file does not state and was assumed, and which columns are not read.
+    `frequency` [Hz], shape (n,)
+    `values`, shape (n,): in the unit, with time as e^{+iωt}
+    `axis`: X of a direct one, XY of one with the force in Y; empty where the file says none
+    `told`: whether the file or the user says which quantity it is
+    `remarks`: what the file does not state and was assumed, and which columns are not read
     """
 
     frequency: FloatArray
@@ -57,18 +50,9 @@ class TextFrf(NamedTuple):
 def read_frf_text(raw: bytes, unit: FrfUnit | None, where: str) -> list[TextFrf]:
     """Return the FRFs of a text of columns.
 
-    Parameters
-    ----------
-    raw : bytes
-    unit : FrfUnit or None
-        Of its values, whatever the file says; None believes the file.
-    where : str
-        The file, for the messages.
-
-    Raises
-    ------
-    InputError
-        Names the line, or what is said and not understood.
+    `unit`: of its values, whatever the file says; None believes the file
+    `where`: the file, for the messages
+    Raises `InputError`, which names the line, or what is said and not understood.
     """
     if b"\0" in raw and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError("FRF", "binary data", "an FRF.csv, a universal file, or text columns frequency, real, imaginary", where)

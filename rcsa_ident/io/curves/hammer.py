@@ -31,12 +31,8 @@ _AXES = ("X", "Y")
 class HammerFile(NamedTuple):
     """The direct receptances of one file.
 
-    Parameters
-    ----------
-    label : str
-        What stood in front of the file's name, or the default.
-    path : Path
-    values : dict of axis to MeasuredCurve
+    `label`: what stood in front of the file's name, or the default
+    `values`: dict of axis to MeasuredCurve
     """
 
     label: str
@@ -47,13 +43,8 @@ class HammerFile(NamedTuple):
 def labelled(text: str, default: str, known: Collection[str] = ()) -> tuple[str, Path]:
     """Return label and path of ``LABEL=FILE`` or ``FILE``.
 
-    Parameters
-    ----------
-    text : str
-    default : str
-        Label of a text without one.
-    known : collection of str
-        Labels that are allowed; empty allows any.
+    `default`: label of a text without one
+    `known`: labels that are allowed; empty allows any
     """
     before, sign, after = text.partition("=")
     # a name with = in it is a file if such a file is there
@@ -70,10 +61,7 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
     A file of one function without directions (text columns) holds for both axes only if its name ends in x or y; such a file
     has that axis.
 
-    Raises
-    ------
-    InputError
-        The file holds no such function, or several of one axis.
+    Raises `InputError`: the file holds no such function, or several of one axis.
     """
     path = Path(path)
     found: dict[str, MeasuredCurve] = {}
@@ -97,17 +85,11 @@ def write_calibrated_tooling(
 ) -> None:
     """Write a tooling file again with another contact and how well that is known; all else stays as it was written, comments included.
 
-    Parameters
-    ----------
-    source, target : path
-        Tooling file that is read, and the one that is written.
-    contact : Contact
-        The new one.
-    log_std : sequence of float, length 4
-        Standard deviations of its logarithms, stiffnesses first; `spread` of a file has one number for translation and rotation, and the
-        larger one is honest. A file that states nothing of the rest goes on to count as exact there.
-    remarks : sequence of str
-        Written above it as comments.
+    `source`, `target`: tooling file that is read, and the one that is written
+    `contact`: the new one
+    `log_std`: sequence of float, length 4. Standard deviations of its logarithms, stiffnesses first; `spread` of a file has one number for
+        translation and rotation, and the larger one is honest. A file that states nothing of the rest goes on to count as exact there.
+    `remarks`: written above it as comments
     """
     values = {
         "translational_stiffness": ("N/m per m", contact.translational_stiffness),
@@ -144,10 +126,7 @@ def write_calibrated_tooling(
 def read_hammer_test(test: HammerTest) -> MeasuredCurve:
     """Return the frequencies [Hz] and the receptance [m/N] of a test's file, shape (n,) both, with what was assumed.
 
-    Raises
-    ------
-    InputError
-        Names the file, and its records where the test names none of several.
+    Raises `InputError`, which names the file, and its records where the test names none of several.
     """
     found = read_frfs(test.file, test.units)
     if test.record is not None:

@@ -25,16 +25,9 @@ def write_lobes(
 ) -> None:
     """Write LOBES.csv; the band's columns are empty where even its edge is beyond the largest depth.
 
-    Parameters
-    ----------
-    path : path
-    lobes : StabilityLobes
-    surface : SurfaceError, optional
-        At the same speeds: two further columns.
-    recommended : array, shape (n,) [m], optional
-        Recommended depths; by default those of the lobes alone, which look no further than their own speeds.
-    preview : bool
-        Whether the limits only say where to look: then no band is written, and the column of recommended depths is empty.
+    `surface`: at the same speeds: two further columns
+    `recommended` [m], shape (n,): recommended depths; by default those of the lobes alone, which look no further than their own speeds
+    `preview`: whether the limits only say where to look: then no band is written, and the column of recommended depths is empty
     """
     band, extra = lobes.band, dict[str, FloatArray]()
     if band is not None and not preview:

@@ -29,12 +29,9 @@ LOBES = ("spindle_speed_rpm", "limit_depth_mm", "chatter_frequency_hz", "lobe")
 class FrfCurves(NamedTuple):
     """Tip receptances per machine axis.
 
-    Parameters
-    ----------
-    frequency : array, shape (n,) [Hz]
-    values : dict of axis to complex array, shape (n,) [m/N]
-    bands : dict of name to array, shape (n,)
-        Further columns.
+    `frequency` [Hz], shape (n,)
+    `values`: dict of axis to complex array, shape (n,) [m/N]
+    `bands`: dict of name to array, shape (n,); further columns
     """
 
     frequency: FloatArray
@@ -45,15 +42,9 @@ class FrfCurves(NamedTuple):
 class LobeCurves(NamedTuple):
     """The lowest limit over spindle speed; NaN where the cut is stable up to the largest depth.
 
-    Parameters
-    ----------
-    speed : array, shape (n,) [rev/min]
-    limit : array, shape (n,) [mm]
-    chatter_frequency : array, shape (n,) [Hz]
-    lobe : array, shape (n,)
-        Whole numbers.
-    extra : dict of name to array, shape (n,)
-        Further columns.
+    `speed` [rev/min], shape (n,); `limit` [mm], shape (n,); `chatter_frequency` [Hz], shape (n,)
+    `lobe`, shape (n,): whole numbers
+    `extra`: dict of name to array, shape (n,); further columns
     """
 
     speed: FloatArray
@@ -68,13 +59,9 @@ def write_frf_csv(
 ) -> None:
     """Write tip receptances [m/N] of axes X, Y and Z, or some of them; numbers read back exactly.
 
-    Parameters
-    ----------
-    path : path
-    frequency_hz : array, shape (n,)
-        Rising.
-    values : mapping of axis to complex array, shape (n,)
-    bands : mapping of column name to array, shape (n,), optional
+    `frequency_hz`, shape (n,): rising
+    `values`: mapping of axis to complex array, shape (n,)
+    `bands`: mapping of column name to array, shape (n,)
     """
     where = str(path)
     if not values or any(axis not in AXES for axis in values):
@@ -171,14 +158,10 @@ def write_lobes_csv(
 ) -> None:
     """Write stability lobes; limit, chatter frequency and lobe are empty where the limit is NaN or infinite.
 
-    Parameters
-    ----------
-    path : path
-    speed_rpm, limit_mm, chatter_hz, lobe : array, shape (n,)
-        A chatter frequency or lobe that is not known is NaN; so are stable places in `extra`.
-    extra : mapping of column name to array, shape (n,), optional
-    whole : sequence of str
-        Columns of `extra` that hold whole numbers.
+    `speed_rpm`, `limit_mm`, `chatter_hz`, `lobe`, shape (n,): a chatter frequency or lobe that is not known is NaN; so are stable places in
+        `extra`
+    `extra`: mapping of column name to array, shape (n,)
+    `whole`: columns of `extra` that hold whole numbers
     """
     columns = {name: np.array(v, dtype=float) for name, v in zip(LOBES, (speed_rpm, limit_mm, chatter_hz, lobe), strict=True)}
     for name in LOBES[:3]:
@@ -198,12 +181,8 @@ def write_lobes_csv(
 def write_speed_csv(path: str | Path, speed_rpm: ArrayLike, columns: Mapping[str, ArrayLike]) -> None:
     """Write columns over spindle speed; a number that is not finite is an empty cell.
 
-    Parameters
-    ----------
-    path : path
-    speed_rpm : array, shape (n,)
-        Above 0.
-    columns : mapping of column name to array, shape (n,)
+    `speed_rpm`, shape (n,): above 0
+    `columns`: mapping of column name to array, shape (n,)
     """
     speed = np.asarray(speed_rpm, dtype=float)
     if not np.all(speed > 0.0):
@@ -214,13 +193,8 @@ def write_speed_csv(path: str | Path, speed_rpm: ArrayLike, columns: Mapping[str
 def write_map_csv(path: str | Path, speed_rpm: FloatArray, depth_mm: FloatArray, growth: FloatArray) -> None:
     """Write a map of stable cuts, a row for each speed and depth: how fast a vibration grows per tooth, and 1 where none does.
 
-    Parameters
-    ----------
-    path : path
-    speed_rpm : array, shape (n,)
-    depth_mm : array, shape (k,)
-    growth : array, shape (n, k) [-]
-        Logarithm of the growth per tooth period.
+    `speed_rpm`, shape (n,); `depth_mm`, shape (k,)
+    `growth` [-], shape (n, k): logarithm of the growth per tooth period
     """
     n, k = growth.shape
     columns = {LOBES[0]: np.repeat(speed_rpm, k), "axial_depth_mm": np.tile(depth_mm, n)}

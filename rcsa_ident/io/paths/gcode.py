@@ -49,17 +49,9 @@ def read_gcode(path: str | Path, tolerance: float = 1e-6) -> ToolPath:
     nobody told. G28, G30 and G53 lead where nobody knows: Z stands from there on at the highest that the program tells anywhere, X and Y
     where they were, until they are told next; a rapid move that tells Z again goes across first, then down.
 
-    Parameters
-    ----------
-    path : path
-    tolerance : float [m]
-        Between arcs and their chords.
-
-    Raises
-    ------
-    InputError
-        Names file and line, for all that would change the path and is not understood: radius correction, macros, subprograms,
-        further axes that move, a change of the work coordinates.
+    `tolerance` [m]: between arcs and their chords
+    Raises `InputError`, which names file and line, for all that would change the path and is not understood: radius correction, macros,
+        subprograms, further axes that move, a change of the work coordinates.
     """
     return gcode_of(decoded(read_bytes(path, "program", LARGEST_PROGRAM), "program", str(path)), str(path), tolerance)
 
@@ -109,15 +101,7 @@ def _blocks(text: str, where: str) -> Iterator[tuple[int, str]]:
 
 
 class Kept(NamedTuple):
-    """Words of a program's line that move nothing.
-
-    Parameters
-    ----------
-    line : int
-    after : bool
-        Whether they act behind the line's move.
-    text : str
-    """
+    """Words of a program's line that move nothing. `after`: whether they act behind the line's move."""
 
     line: int
     after: bool
@@ -130,10 +114,7 @@ def kept_words(path: str | Path) -> tuple[list[Kept], list[int]]:
     Work coordinates, corrections of the tool's length, smoothing, dwells, tools, speeds, coolant, stops and further M words; with them
     `write_gcode` writes a program of another path.
 
-    Parameters
-    ----------
-    path : path
-        Of a program that `read_gcode` reads.
+    `path`: of a program that `read_gcode` reads
     """
     kept, led, unit, cycle = [], [], 1.0, False
     for number, block in _blocks(decoded(read_bytes(path, "program", LARGEST_PROGRAM), "program", str(path)), str(path)):
@@ -163,12 +144,7 @@ def kept_words(path: str | Path) -> tuple[list[Kept], list[int]]:
 
 
 class _Program:
-    """What a controller remembers from line to line, and the places so far, in millimetres.
-
-    Parameters
-    ----------
-    tolerance : float [m]
-    """
+    """What a controller remembers from line to line, and the places so far, in millimetres. `tolerance` [m]."""
 
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
@@ -436,20 +412,10 @@ def write_gcode(path: str | Path, tool_path: ToolPath, decimals: int = 4, kept: 
     Nobody knows where the tool stands before: it goes to the first place by Z, then across, where the path is nowhere higher; otherwise
     across as high as it stands, then by Z.
 
-    Parameters
-    ----------
-    path : path
-    tool_path : ToolPath
-        With the tool upright.
-    decimals : int
-        Of the places in millimetres.
-    kept : sequence of Kept
-        What else the program says whose lines the path has: tools and speeds are its own then.
-
-    Raises
-    ------
-    InputError
-        If the tool leans, or a feed or speed is not told behind one that is: a program would keep the last one.
+    `tool_path`: with the tool upright
+    `decimals`: of the places in millimetres
+    `kept`: what else the program says whose lines the path has: tools and speeds are its own then
+    Raises `InputError` if the tool leans, or a feed or speed is not told behind one that is: a program would keep the last one.
     """
     where = str(path)
     if np.any(tool_path.axes[:, 2] < 1.0 - 1e-12):

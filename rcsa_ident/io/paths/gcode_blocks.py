@@ -135,14 +135,9 @@ def check_further(
 ) -> None:
     """Refuse words of `FURTHER` that nothing in their line reads.
 
-    Parameters
-    ----------
-    codes, words : mapping
-        Of the line, as `words_of` returns them.
-    single, motion : float or None
-        Code of the line that acts in it alone, and the motion that stands.
-    cycle : bool
-        Whether a canned cycle stands.
+    `codes`, `words`: of the line, as `words_of` returns them
+    `single`, `motion`: code of the line that acts in it alone, and the motion that stands
+    `cycle`: whether a canned cycle stands
     """
     said = codes["M"] or single == 4 or any(KINDS[code] in ("told", "system") for code in codes["G"])
     if not (said or cycle) and ("Q" in words or ("P" in words and motion not in (2, 3))):

@@ -24,14 +24,9 @@ _STRAIGHT, _SLACK = 1e-6, 1e-6
 class Cycle:
     """A canned cycle as it stands from line to line, in millimetres.
 
-    Parameters
-    ----------
-    code : int
-        One of `CYCLES`.
-    initial : float
-        Height at which the tool stood before.
-    bottom, clearance, step : float
-        Heights of Z and R, and Q; no number where nobody told.
+    `code`: one of `CYCLES`
+    `initial`: height at which the tool stood before
+    `bottom`, `clearance`, `step`: heights of Z and R, and Q; no number where nobody told
     """
 
     code: int
@@ -79,17 +74,10 @@ class Cycle:
 class Corner:
     """A corner that waits for the move behind it, in millimetres.
 
-    Parameters
-    ----------
-    kind : str
-        ``R`` of a radius, ``C`` of a chamfer.
-    size : float
-        The radius, or how far from the corner the chamfer begins and ends.
-    start, place : list of float
-        Where the move to the corner begins, and the corner itself.
-    feed : float
-    number : int
-        Line of the program.
+    `kind`: ``R`` of a radius, ``C`` of a chamfer
+    `size`: the radius, or how far from the corner the chamfer begins and ends
+    `start`, `place`: where the move to the corner begins, and the corner itself
+    `number`: line of the program
     """
 
     kind: str

@@ -33,10 +33,7 @@ def read_mesh(path: str | Path) -> Surface:
 
     Facets whose corners are not three points have no area: they are left out, which is remarked.
 
-    Raises
-    ------
-    InputError
-        Names the file and what is wrong with it: its kind, damage, a surface that is not closed, another unit.
+    Raises `InputError`, which names the file and what is wrong with it: its kind, damage, a surface that is not closed, another unit.
     """
     where, kind = str(path), Path(path).suffix.lower()
     if kind not in MESHES:
@@ -117,14 +114,7 @@ _CHECKS = {".stl": _check_stl, ".ply": _check_ply, ".obj": _check_obj}
 
 
 def write_mesh(path: str | Path, points: FloatArray, faces: np.ndarray) -> None:
-    """Write a surface in millimetres; the suffix says as what.
-
-    Parameters
-    ----------
-    path : path
-    points : array, shape (v, 3) [m]
-    faces : array of int, shape (f, 3)
-    """
+    """Write a surface in millimetres; the suffix says as what. `points` [m], shape (v, 3). `faces`: array of int, shape (f, 3)."""
     check_mesh_name(path)
     trimesh = _trimesh(str(path))
     body = trimesh.Trimesh(1e3 * points, faces, process=False)

@@ -23,10 +23,7 @@ def read_path_forces(path: str | Path, tool_path: ToolPath) -> ForceAlongPath:
     Columns ``time_s``, rising, ``force_x_n``, ``force_y_n``, ``force_z_n`` of the workpiece on the tool, in the path's axes; and ``x_mm``,
     ``y_mm``, ``z_mm`` of the tool's tip where they stand there: forces of another path are refused.
 
-    Raises
-    ------
-    InputError
-        Names the file and the line.
+    Raises `InputError`, which names the file and the line.
     """
     table = read_table(path, "forces")
     time, *force = finite_columns(table, (TIME, *FORCE)).T

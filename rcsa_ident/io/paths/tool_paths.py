@@ -122,14 +122,8 @@ def check_path_name(path: str | Path) -> None:
 def write_tool_path(path: str | Path, tool_path: ToolPath, decimals: int = 4, kept: Sequence[Kept] = ()) -> None:
     """Write a path in the form that the file's name says; `read_tool_path` gives it back, line numbers aside.
 
-    Parameters
-    ----------
-    path : path
-    tool_path : ToolPath
-    decimals : int
-        Of the places in millimetres; those of a program only, a table has them to a picometre.
-    kept : sequence of Kept
-        What else a program says, of which a table has nothing.
+    `decimals`: of the places in millimetres; those of a program only, a table has them to a picometre
+    `kept`: what else a program says, of which a table has nothing
     """
     check_path_name(path)
     if Path(path).suffix.lower() in PROGRAMS:
@@ -150,12 +144,7 @@ def write_tool_path(path: str | Path, tool_path: ToolPath, decimals: int = 4, ke
 def write_limits_along(path: str | Path, places: FloatArray, speeds: FloatArray, limits: FloatArray, chatter: FloatArray) -> None:
     """Write MAP.csv: a limit for each place and speed; an empty cell where the cut is stable up to the largest depth.
 
-    Parameters
-    ----------
-    path : path
-    places : array, shape (k, 3) [m]
-    speeds : array, shape (n,) [rad/s]
-    limits, chatter : arrays, shape (k, n) [m, rad/s]
+    `places` [m], shape (k, 3); `speeds` [rad/s], shape (n,); `limits`, `chatter` [m, rad/s], shape (k, n)
     """
     k, n = limits.shape
     # metres and back leave a last digit that nobody asked for

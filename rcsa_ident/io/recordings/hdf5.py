@@ -55,12 +55,9 @@ _LINKS = {h5py.h5l.TYPE_SOFT: "a soft link", h5py.h5l.TYPE_EXTERNAL: "a link to 
 def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike]) -> None:
     """Write channels as float32, contiguous, with the sampling rate on the root.
 
-    Parameters
-    ----------
-    path : path
-    rate : float [Hz]
-    channels : mapping of name to array, shape (n,)
-        In the units of the file: signal, not yet divided by a sensitivity. A lost sample is NaN.
+    `rate` [Hz]
+    `channels`: mapping of name to array, shape (n,). In the units of the file: signal, not yet divided by a sensitivity. A lost sample is
+        NaN.
     """
     positive(RATE, rate, "Hz")
     arrays = {name: np.asarray(values, dtype=np.float32) for name, values in channels.items()}
@@ -80,13 +77,8 @@ def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike])
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
     """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each; long ones stay in it.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate
     """
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
@@ -239,11 +231,7 @@ class _MatlabTables:
 def matlab_tables(path: Path, kinds: Sequence[str]) -> Iterator[_MatlabTables]:
     """Open a file of version 7.3, whose rows are MATLAB's columns.
 
-    Parameters
-    ----------
-    path : path
-    kinds : sequence of str
-        Allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides.
+    `kinds`: allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides
     """
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size

@@ -54,15 +54,9 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None, 
     and is as long), else from a number ``sampling_rate_hz``, ``Fs``, ``SampleRate`` or an interval ``dt``, ``Ts``, both where the
     channel stands or around it, else from the campaign.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate; of several vectors of times the one that tells this rate is taken.
-    time : str or None
-        Name of the vector of times, where the file's names do not tell it.
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate; of several vectors of times the one that tells this rate is taken
+    `time`: name of the vector of times, where the file's names do not tell it
     """
     with tables_of(path) as tables:
         return _read(tables, names, default_rate, time, str(path))

@@ -44,15 +44,9 @@ _DEEPEST = 16
 class Variable:
     """What the header of a variable says.
 
-    Parameters
-    ----------
-    start, size : int
-        Place and bytes of its element in the file.
-    packed : bool
-    length : int
-        Bytes of the element when unpacked, its tag included.
-    data : int
-        Place of the samples' own tag in these.
+    `start`, `size`: place and bytes of its element in the file
+    `length`: bytes of the element when unpacked, its tag included
+    `data`: place of the samples' own tag in these
     """
 
     name: str
@@ -213,14 +207,7 @@ def samples(raw: Bytes, order: str, variable: Variable, where: str) -> FloatArra
 
 
 class Version5:
-    """Variables of a file of version 5, and the numbers in its structs and cells.
-
-    Parameters
-    ----------
-    raw : bytes
-    where : str
-        The file, for the messages.
-    """
+    """Variables of a file of version 5, and the numbers in its structs and cells. `where`: the file, for the messages."""
 
     def __init__(self, raw: Bytes, where: str) -> None:
         self.order = {b"IM": "<", b"MI": ">"}.get(raw[126:128], "")

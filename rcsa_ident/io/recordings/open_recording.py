@@ -33,21 +33,11 @@ _LISTING = {
 def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: float | None = None, suffix: str = "") -> OpenRecording:
     """Return a recording as its file tells it, without settings: channels, their units and the rate.
 
-    Parameters
-    ----------
-    path : path
-        Text tables with names and units above them, sound, and the formats whose channels have names and may have units.
-    names : sequence of str
-        Channels that are wanted; none for all.
-    default_rate : float or None [Hz]
-        Rate of a file that carries none.
-    suffix : str
-        Format of a file whose name does not tell it.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or does not tell what is needed; the message names the option that does.
+    `path`: text tables with names and units above them, sound, and the formats whose channels have names and may have units
+    `names`: channels that are wanted; none for all
+    `default_rate` [Hz]: rate of a file that carries none
+    `suffix`: format of a file whose name does not tell it
+    Raises `InputError`: the file cannot be read, or does not tell what is needed; the message names the option that does.
     """
     path = Path(path)
     suffix = (suffix or path.suffix).lower()

@@ -59,13 +59,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
 
     The rate comes from a column ``time`` in seconds, else from the file's metadata ``sampling_rate_hz``, else from the campaign.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate
     """
     where = str(path)
     raw = mapped(path, "recording", LARGEST_FILE)

@@ -109,22 +109,11 @@ def read_signals(
 
     Where a format has no place for units, names may tell them, as ``acc (mV)``.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
-    suffix : str or None
-        Taken in place of the path's own.
-    cut_off, time : str
-        As with `read_recording`.
-
-    Raises
-    ------
-    InputError
-        As with `read_recording`.
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate
+    `suffix`: taken in place of the path's own
+    `cut_off`, `time`: as with `read_recording`
+    Raises `InputError` as with `read_recording`.
     """
     path = Path(path)
     suffix = path.suffix if suffix is None else suffix
@@ -157,11 +146,7 @@ def read_signals(
 class StoredSamples:
     """Samples of a long recording in SI, read where they are asked for: of an array, shape (n, c), it has the shape and slices.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    signals : sequence of Channel
-    sensors : tuple of Sensor
+    `rate` [Hz]
     """
 
     def __init__(self, rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> None:
@@ -183,12 +168,8 @@ def recorded(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...
 def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> Recording:
     """Return signals, shape (n,) each, divided by their sensors' sensitivities; a trigger stays as it is.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    signals : sequence of array, shape (n,) each
-        As they stand in the file.
-    sensors : tuple of Sensor
+    `rate` [Hz]
+    `signals`: sequence of array, shape (n,) each; as they stand in the file
     """
     _check_units(signals, sensors)
     size = 8 * signals[0].size * len(sensors)
@@ -230,12 +211,7 @@ def _check_units(signals: Sequence[Channel], sensors: Sequence[Sensor]) -> None:
 def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) -> tuple[Recording, Recording | None]:
     """Return the recordings of a cut: the cut itself, and its air cut where there is one; the samples of long ones stay in their files.
 
-    Parameters
-    ----------
-    sensors : tuple of Sensor
-    default_rate : float or None [Hz]
-        For files that carry no rate.
-    cut : Cut
+    `default_rate` [Hz]: for files that carry no rate
     """
 
     def read(path: Path) -> Recording:

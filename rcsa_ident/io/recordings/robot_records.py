@@ -24,13 +24,7 @@ _EVEN = 1e-3
 
 
 def read_joint_record(path: str | Path) -> JointRecord:
-    """Return a motion of a robot's joints.
-
-    Raises
-    ------
-    InputError
-        Names the file, and the field or column that is missing or wrong.
-    """
+    """Return a motion of a robot's joints. Raises `InputError`, which names the file, and the field or column that is missing or wrong."""
     path = Path(path)
     return _from_matlab(path) if path.suffix.lower() == ".mat" else _from_text(path)
 

@@ -38,14 +38,9 @@ _HEAD = MEGABYTE // 8
 class OpenChannel:
     """A channel as a file tells it.
 
-    Parameters
-    ----------
-    name, unit : str
-        Empty where the file says no unit.
-    quantity : Quantity or None
-        What the unit measures; None where it says none that is known.
-    samples : array, shape (n,)
-        In SI where the quantity is known, full scale 1 of sound.
+    `name`, `unit`: empty where the file says no unit
+    `quantity`: what the unit measures; None where it says none that is known
+    `samples`, shape (n,): in SI where the quantity is known, full scale 1 of sound
     """
 
     name: str
@@ -58,14 +53,9 @@ class OpenChannel:
 class OpenRecording:
     """A recording and what was taken as given.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    channels : tuple of OpenChannel
-    remarks : tuple of Remark
-        What was assumed.
-    lossy : bool
-        Compressed with loss: lines stay where they are, decays do not.
+    `rate` [Hz]
+    `remarks`: what was assumed
+    `lossy`: compressed with loss: lines stay where they are, decays do not
     """
 
     rate: float
@@ -79,18 +69,10 @@ class OpenRecording:
         """Return the channels of one quantity, and what was assumed: those that are named, or all of the first quantity of acceleration,
         sound, force and motion.
 
-        Parameters
-        ----------
-        quantity : Quantity or None
-            What channels measure whose unit does not say it.
-        names : sequence of str
-        sensitivity : float or None
-            Signal per SI unit of such channels.
-
-        Raises
-        ------
-        InputError
-            A name is not there, nothing tells what a channel measures, or its unit asks for the sensitivity; the message names the option.
+        `quantity`: what channels measure whose unit does not say it
+        `sensitivity`: signal per SI unit of such channels
+        Raises `InputError`: a name is not there, nothing tells what a channel measures, or its unit asks for the sensitivity; the message
+            names the option.
         """
         present = [each.name for each in self.channels]
         chosen = tuple(self.channels[the_only(name, present, "")] for name in names) or self.channels
@@ -127,13 +109,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     A table with one line of names, and nothing but them, above its numbers is read as `text_columns` does, as it stands. One with more
     (a preamble, a line of units) tells names, units and rate itself: channels of a known unit are turned into SI.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate
     """
     if _tells_more(path):
         opened = told_table(path, default_rate, names)
@@ -213,18 +190,9 @@ def _tells_more(path: Path) -> bool:
 def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = ()) -> OpenRecording:
     """Return a text table as its own lines tell it.
 
-    Parameters
-    ----------
-    path : path
-    default_rate : float or None [Hz]
-        Rate of a file that carries none.
-    wanted : sequence of str
-        Channels that are there though they hold one value throughout, or have a unit that nobody knows.
-
-    Raises
-    ------
-    InputError
-        As `open_recording`.
+    `default_rate` [Hz]: rate of a file that carries none
+    `wanted`: channels that are there though they hold one value throughout, or have a unit that nobody knows
+    Raises `InputError` as `open_recording`.
     """
     where = str(path)
     lines = beside(lines_of(decoded(read_bytes(path, "recording", LARGEST_TEXT), "recording", where)))

@@ -31,15 +31,9 @@ _UNKNOWN = 1 << 62
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None, cut_off: str = "refuse") -> tuple[float, list[Channel]]:
     """Return the sampling rate [Hz] and the named channels, full scale 1, shape (n,) each; long ones on the disk.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted: ch1, ch2, ...
-    default_rate : float or None [Hz]
-        Not used: every sound file carries its rate.
-    cut_off : str
-        ``refuse`` or ``note``: what a file that ends too early is.
+    `names`: channels that are wanted: ch1, ch2, ...
+    `default_rate` [Hz]: not used: every sound file carries its rate
+    `cut_off`: ``refuse`` or ``note``: what a file that ends too early is
     """
     return decoded(path, names, cut_off)
 
@@ -98,13 +92,7 @@ def decoded(path: Path, names: Sequence[str], cut_off: str, tracks: Sequence[str
 
 
 def cut(found: str, seconds: float, cut_off: str, where: str) -> str:
-    """Return the sentence about a file that ends too early.
-
-    Raises
-    ------
-    InputError
-        Such files are refused.
-    """
+    """Return the sentence about a file that ends too early. Raises `InputError`: such files are refused."""
     if cut_off == "refuse":
         raise InputError("recording", f"{found}: the file is cut off", COMPLETE, where)
     return f"the file is cut off ({found}): its first {seconds:.4g} s are read"

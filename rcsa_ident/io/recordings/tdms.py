@@ -59,13 +59,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     A channel is called by its name, or as ``group/channel`` where two groups have one of that name. The rate is the waveform's
     (``wf_increment``), else the campaign's.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate
     """
     with _opened(path) as (file, size):
         return _channels(file, names, default_rate, size, str(path))

@@ -31,13 +31,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     A channel is called by its response entity, the label of its ordinate, its title or its place (``3:-X``). The header keeps six
     digits of the step: the rate is the campaign's where that is one of those that it may stand for, else the roundest of these.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate
     """
     where = str(path)
     records = _records(path)

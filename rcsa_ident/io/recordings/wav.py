@@ -38,15 +38,9 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None, 
 
     Channels are called ch1, ch2, ...; where the file names its tracks (iXML), these names count, too.
 
-    Parameters
-    ----------
-    path : path
-    names : sequence of str
-        Channels that are wanted.
-    default_rate : float or None [Hz]
-        For a file that carries no rate.
-    cut_off : str
-        ``refuse`` or ``note``: what a file that ends before its declared samples is. One that never declared them, as a pipe writes
+    `names`: channels that are wanted
+    `default_rate` [Hz]: for a file that carries no rate
+    `cut_off`: ``refuse`` or ``note``: what a file that ends before its declared samples is. One that never declared them, as a pipe writes
         it, is complete wherever it ends.
     """
     where = str(path)

@@ -30,10 +30,7 @@ def axial_to_json(flange: AxialFlange) -> dict[str, Any]:
 def axial_of(top: Table) -> AxialFlange | None:
     """Return what a result file says, None where it says nothing.
 
-    Raises
-    ------
-    InputError
-        Names the key, what was found and what is allowed.
+    Raises `InputError`, which names the key, what was found and what is allowed.
     """
     if "axial" not in top:
         return None

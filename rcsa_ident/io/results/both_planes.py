@@ -21,11 +21,7 @@ _SHAPE = "four pairs of finite numbers: translation and slope in X, then in Y"
 def both_planes_to_json(posterior: CoupledPosterior, deviation: tuple[FloatArray, FloatArray] | None = None) -> dict[str, Any]:
     """Return both planes as they stand in the file: modes with their directions to be read, unknowns and covariance to go on from.
 
-    Parameters
-    ----------
-    posterior : CoupledPosterior
-    deviation : (array, array), optional
-        Standard deviations of the natural frequencies [rad/s] and damping ratios of the machine that does not turn.
+    `deviation`: (array, array); standard deviations of the natural frequencies [rad/s] and damping ratios of the machine that does not turn
     """
     best = posterior.best
     standing, machine = best.standing(), unpack(best.theta, best.layout.block)
@@ -56,13 +52,7 @@ def both_planes_to_json(posterior: CoupledPosterior, deviation: tuple[FloatArray
 
 
 def both_planes_from_json(table: Table) -> CoupledPosterior:
-    """Return both planes of a file.
-
-    Raises
-    ------
-    InputError
-        If unknowns, layout and covariance do not belong together.
-    """
+    """Return both planes of a file. Raises `InputError` if unknowns, layout and covariance do not belong together."""
     best = _unknowns(table)
     for mode in table.tables("modes"):
         mode.number("natural_frequency_hz", "Hz", above=0.0)

@@ -25,11 +25,7 @@ _LENGTHS = (*LENGTHS, "fluted_length")
 def known_toolings_to_json(known: KnownToolings, learned: Sequence[LearnedValue] = ()) -> dict[str, Any]:
     """Return what is known of toolings as a result holds it: each number in millimetres or percent, and the covariance in their spreads.
 
-    Parameters
-    ----------
-    known : KnownToolings
-    learned : sequence of LearnedValue
-        The same in the terms of the drawings, for those who read it.
+    `learned`: the same in the terms of the drawings, for those who read it
     """
     rows = []
     for k, unknown in enumerate(known.unknowns):
@@ -68,13 +64,7 @@ def learned_of(toolings: Mapping[str, Any]) -> tuple[LearnedValue, ...]:
 
 
 def known_toolings_of(table: Table) -> KnownToolings:
-    """Return what is known of toolings from a result's table.
-
-    Raises
-    ------
-    InputError
-        If something is missing or does not belong together.
-    """
+    """Return what is known of toolings from a result's table. Raises `InputError` if something is missing or does not belong together."""
     unknowns, spread, mean = [], [], []
     for row in table.tables("unknowns"):
         field = row.text("what", choices=ALTERATIONS)
@@ -99,14 +89,8 @@ def axis_toolings_to_json(posterior: Posterior) -> dict[str, Any]:
 def axis_toolings_of(axis: Table, known: KnownToolings | None, size: int, rivals: int) -> Mapping[str, Any]:
     """Return the fields of an axis' `Posterior` that belong to toolings.
 
-    Parameters
-    ----------
-    axis : Table
-    known : KnownToolings or None
-    size : int
-        Unknowns of the axis.
-    rivals : int
-        Other models of the same data.
+    `size`: unknowns of the axis
+    `rivals`: other models of the same data
     """
     if known is None or "toolings" not in axis:
         return {}

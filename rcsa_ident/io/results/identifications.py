@@ -92,14 +92,9 @@ def speed_band_to_json(
 ) -> dict[str, Any]:
     """Return one entry of ``speed_bands``: what the cuts of a range of spindle speeds [rad/s] say for themselves.
 
-    Parameters
-    ----------
-    speeds : (float, float) [rad/s]
-        Lowest and highest speed.
-    identification : Identification
-        Of the cuts between them.
-    deviations : mapping
-        Standard deviations of its modes, as in `identification_to_json`.
+    `speeds`: (float, float) [rad/s]; lowest and highest speed
+    `identification`: of the cuts between them
+    `deviations`: standard deviations of its modes, as in `identification_to_json`
     """
     return {
         "speed_range_rpm": [to_rpm(speed) for speed in speeds],
@@ -209,17 +204,9 @@ def _delays(identification: Identification, campaign: Campaign) -> dict[str, dic
 def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
     """Return the identified machine, each axis with its posterior where the file holds one, and the models of single speed ranges.
 
-    Parameters
-    ----------
-    data : mapping
-        The result as `read_result` returns it.
-    where : str
-        The file, for the messages.
-
-    Raises
-    ------
-    InputError
-        If the identification has failed and no axis is there, or unknowns and covariance do not belong together.
+    `data`: the result as `read_result` returns it
+    `where`: the file, for the messages
+    Raises `InputError` if the identification has failed and no axis is there, or unknowns and covariance do not belong together.
     """
     top = Table(data, where)
     toolings = known_toolings_of(top.table("toolings")) if "toolings" in top else None

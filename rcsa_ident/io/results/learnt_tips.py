@@ -41,10 +41,7 @@ def write_learnt_tip(path: str | Path, learnt: LearntTip) -> None:
 def read_learnt_tip(path: str | Path) -> LearntTip:
     """Return the tip of LEARNT.json after every key, shape and number has been checked.
 
-    Raises
-    ------
-    InputError
-        Names the file, the key, what was found and what is allowed.
+    Raises `InputError`, which names the file, the key, what was found and what is allowed.
     """
     return learnt_tip_of(read_json(path, "learnt tip"), str(path))
 

@@ -31,10 +31,7 @@ _LINE = 140
 def spindle_to_json(modes: ModalModel, joint: LumpedJoint) -> dict[str, Any]:
     """Return one axis as it stands in the file; complex numbers are [real, imaginary].
 
-    Parameters
-    ----------
-    modes : ModalModel
-        Coordinates: translation and slope of the flange.
+    `modes`: coordinates: translation and slope of the flange
     """
     if len(modes.coordinates) != 2:
         raise InputError("coordinates", ", ".join(map(str, modes.coordinates)), "translation and slope of the flange")
@@ -56,14 +53,9 @@ def spindle_to_json(modes: ModalModel, joint: LumpedJoint) -> dict[str, Any]:
 def spindle_from_json(data: Any, axis: Dof, where: str, path: str = "") -> tuple[ModalModel, LumpedJoint]:
     """Return modes at the flange and joint of one axis.
 
-    Parameters
-    ----------
-    data : mapping
-        What `spindle_to_json` writes; further keys are left alone.
-    axis : Dof
-        X or Y.
-    where, path : str
-        File and dotted key, for the messages.
+    `data`: mapping, what `spindle_to_json` writes; further keys are left alone
+    `axis`: X or Y
+    `where`, `path`: file and dotted key, for the messages
     """
     table = Table(data, where, path or f"axes.{axis.upper()}")
     modes = table.tables("modes")
@@ -80,10 +72,7 @@ def spindle_from_json(data: Any, axis: Dof, where: str, path: str = "") -> tuple
 def read_result(path: str | Path) -> dict[str, Any]:
     """Return the content of RESULT.json after every key, type, shape and number has been checked.
 
-    Raises
-    ------
-    InputError
-        Names the file, the key or line, what was found and what is allowed.
+    Raises `InputError`, which names the file, the key or line, what was found and what is allowed.
     """
     data = read_json(path, "result")
     check_result(data, str(path))

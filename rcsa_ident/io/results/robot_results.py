@@ -27,16 +27,7 @@ _DIGITS = 8
 
 
 def write_robot_result(path: str | Path, found: RobotIdentification, campaign: str, left_out: Sequence[tuple[str, str]]) -> None:
-    """Write RESULT.json; the old file or the new one, never half of it.
-
-    Parameters
-    ----------
-    path : path
-    found : RobotIdentification
-    campaign : str
-        Its name.
-    left_out : sequence of (cut id, reason)
-    """
+    """Write RESULT.json; the old file or the new one, never half of it. `campaign`: its name. `left_out`: sequence of (cut id, reason)."""
     write_text(path, layout(plain(robot_result_to_json(found, campaign, left_out))) + "\n")
 
 

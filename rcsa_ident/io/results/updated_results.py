@@ -33,16 +33,10 @@ def refuse_taught(data: Mapping[str, Any], recordings: Mapping[str, str]) -> Non
 def taught_result(data: Mapping[str, Any], machine: IdentifiedMachine, campaign: str, recordings: Iterable[str] = ()) -> dict[str, Any]:
     """Return the content of a result file whose machine knows more than that of an earlier one.
 
-    Parameters
-    ----------
-    data : mapping
-        The earlier result.
-    machine : IdentifiedMachine
-        With a posterior of each axis.
-    campaign : str
-        Name of the cuts that have taught it.
-    recordings : iterable of str
-        As `recordings_of` tells them; of a store that knows its campaigns none.
+    `data`: the earlier result
+    `machine`: with a posterior of each axis
+    `campaign`: name of the cuts that have taught it
+    `recordings`: as `recordings_of` tells them; of a store that knows its campaigns none
     """
     axes = dict(data["axes"])
     for axis, posterior in machine.posteriors().items():

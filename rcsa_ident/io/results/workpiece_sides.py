@@ -48,10 +48,7 @@ def _axis_to_json(axis: WorkpieceAxis) -> dict[str, Any]:
 def workpiece_side_of(top: Table) -> WorkpieceSide | None:
     """Return what a result file says, None where it says nothing.
 
-    Raises
-    ------
-    InputError
-        Names the key, what was found and what is allowed.
+    Raises `InputError`, which names the key, what was found and what is allowed.
     """
     if "workpiece_side" not in top:
         return None

@@ -22,18 +22,9 @@ _CASE = ("name", "tooling", "feed_direction", *ENGAGEMENT_KEYS, "feed_per_tooth_
 class Case(NamedTuple):
     """One configuration.
 
-    Parameters
-    ----------
-    name : str
-    tooling : Tooling
-    engagement : Engagement, Block, Stepover or EngagementMap
-    feed_angle : float [rad]
-    feed_per_tooth : float or None [m]
-    cuts : TestedCuts or None
-    idle : tuple of str
-        Tap-test FRFs of this tooling, each as ``X=FILE``, ``Y=FILE`` or ``FILE``.
-    tests : Path or None
-        The file of the cuts.
+    `feed_angle` [rad]; `feed_per_tooth` [m]
+    `idle`: tap-test FRFs of this tooling, each as ``X=FILE``, ``Y=FILE`` or ``FILE``
+    `tests`: the file of the cuts
     """
 
     name: str
@@ -49,10 +40,7 @@ class Case(NamedTuple):
 def read_cases(path: str | Path) -> list[Case]:
     """Return the cases of a file; the paths in it are relative to it.
 
-    Raises
-    ------
-    InputError
-        Names the file, the key, what was found and what is allowed.
+    Raises `InputError`, which names the file, the key, what was found and what is allowed.
     """
     return cases_of(read_toml(path, "cases"), str(path), Path(path).parent, read_tooling, read_tested_cuts)
 
@@ -66,16 +54,10 @@ def cases_of(
 ) -> list[Case]:
     """Return the cases of a table of keys as `read_cases` finds them in a file.
 
-    Parameters
-    ----------
-    data : mapping
-        The table's keys.
-    where : str
-        The file, for the messages.
-    folder : Path
-        That the paths in it are relative to.
-    tooling, tests : callable
-        Given a path, return the tooling, or the tested cuts, of that file.
+    `data`: the table's keys
+    `where`: the file, for the messages
+    `folder`: that the paths in it are relative to
+    `tooling`, `tests`: given a path, return the tooling, or the tested cuts, of that file
     """
     top = Table(data, where, known=("cases",))
     return [_case(table, folder, tooling, tests, i) for i, table in enumerate(top.tables("cases", _CASE), start=1)]

@@ -33,18 +33,9 @@ _CONDITIONS = tuple(_CUT[key] for key in ("spindle_speed_rpm", "axial_depth_mm",
 def cut_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table, str], Path]) -> Cut:
     """Return a cut of a campaign.
 
-    Parameters
-    ----------
-    table : Table
-        Of `CUT_KEYS`.
-    toolings : mapping of str to Tooling
-    locate : callable
-        Given the table and one of its keys ``cut``, ``air`` and ``engagement``, returns the file.
-
-    Raises
-    ------
-    InputError
-        Names the file, the key, what was found and what is allowed; also of a cut that the cutter cannot make.
+    `table`: of `CUT_KEYS`
+    `locate`: given the table and one of its keys ``cut``, ``air`` and ``engagement``, returns the file
+    Raises `InputError`, which names the file, the key, what was found and what is allowed; also of a cut that the cutter cannot make.
     """
     tooling = table.text("tooling", choices=tuple(toolings), names_of="toolings")
     cutter = toolings[tooling].cutter
@@ -73,12 +64,7 @@ def cut_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Tabl
 def engagement_of(table: Table, cutter: Cutter, locate: Callable[[Table, str], Path]) -> AnyEngagement:
     """Return how a cutter is engaged, of a table that has `ENGAGEMENT_KEYS`.
 
-    Parameters
-    ----------
-    table : Table
-    cutter : Cutter
-    locate : callable
-        Given the table and the key ``engagement``, returns the file.
+    `locate`: given the table and the key ``engagement``, returns the file
     """
     stock = table.field(_CUT["stock"])
     if "engagement" in table:
@@ -183,14 +169,8 @@ def cut_keys(
 ) -> dict[str, Any]:
     """Return an entry of ``[[cuts]]``; its recordings are named after it.
 
-    Parameters
-    ----------
-    name, tooling : str
-    conditions : CuttingConditions
-    last_speed : float or None [rad/s]
-        Of a pass whose speed changes.
-    posture : sequence of float [rad]
-        Of a robot's joints, if it is one.
+    `last_speed` [rad/s]: of a pass whose speed changes
+    `posture`: sequence of float [rad], of a robot's joints, if it is one
     """
     return {
         "id": name,

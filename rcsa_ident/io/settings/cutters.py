@@ -46,15 +46,9 @@ _NAMES = {
 def cutter_of(table: Table) -> Cutter:
     """Return the cutter of a table ``[cutter]``.
 
-    Parameters
-    ----------
-    table : Table
-        Of `CUTTER_KEYS`.
-
-    Raises
-    ------
-    InputError
-        Names the file, the key, what was found and what is allowed: also of outlines that cannot be, and of keys that a shape has not.
+    `table`: of `CUTTER_KEYS`
+    Raises `InputError`, which names the file, the key, what was found and what is allowed: also of outlines that cannot be, and of keys
+        that a shape has not.
     """
     teeth = table.field(_OWN["teeth"])
     diameter = table.field(_OWN["diameter_mm"]) * 1e-3

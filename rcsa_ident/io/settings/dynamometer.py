@@ -15,12 +15,7 @@ from rcsa_ident.setup.cut import Workpiece
 def write_workpiece(path: str | Path, workpiece: Workpiece, remarks: Sequence[str] = ()) -> None:
     """Write ``[workpiece]`` with all its spreads, to be pasted into a campaign or read by `read_workpiece`.
 
-    Parameters
-    ----------
-    path : path
-    workpiece : Workpiece
-    remarks : sequence of str
-        Comments above it, a line each.
+    `remarks`: comments above it, a line each
     """
     write_text(path, toml_of({"workpiece": workpiece_keys(workpiece, all_spreads=True)}, remarks, digits=7))
 

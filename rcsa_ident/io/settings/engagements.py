@@ -26,17 +26,9 @@ MOST_ROWS = 10_000
 def read_engagement_map(path: str | Path, lead: float = 0.0) -> EngagementMap:
     """Return the engagement of a map; a height that stands several times has several arcs.
 
-    Parameters
-    ----------
-    path : path
-        With columns ``z_mm`` from the tip up, ``entry_angle_deg`` and ``exit_angle_deg``.
-    lead : float [rad]
-        By which the tool leans in the direction of the feed: so far the feed climbs towards the spindle.
-
-    Raises
-    ------
-    InputError
-        Names the file and the column.
+    `path`: with columns ``z_mm`` from the tip up, ``entry_angle_deg`` and ``exit_angle_deg``
+    `lead` [rad]: by which the tool leans in the direction of the feed: so far the feed climbs towards the spindle
+    Raises `InputError`, which names the file and the column.
     """
     table = read_table(path, "engagement map")
     for name in COLUMNS:
@@ -66,13 +58,7 @@ def write_engagement(path: str | Path, tool_path: ToolPath, engagement: PathEnga
 
     A move whose edges are nowhere in the material has one row without slice and angles, and the volume that its floor takes out.
 
-    Parameters
-    ----------
-    path : path
-    tool_path : ToolPath
-    engagement : PathEngagement
-    arc_volume : array, shape (n,) [m^3]
-        Of each arc.
+    `arc_volume` [m^3], shape (n,): of each arc
     """
     lines = [",".join(ALONG)]
     degrees = np.degrees([engagement.start, engagement.end])

@@ -23,17 +23,8 @@ _PLAIN = tuple(_OWN[key] for key in ("record", "units", "standstill", "sensor_ma
 def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table, str], Path]) -> HammerTest:
     """Return the hammer test of one table of ``[[frfs]]``.
 
-    Parameters
-    ----------
-    table : Table
-    toolings : mapping of str to Tooling
-    locate : callable
-        Given the table and its key ``file``, returns the file.
-
-    Raises
-    ------
-    InputError
-        Names the key, what was found and what is allowed.
+    `locate`: given the table and its key ``file``, returns the file
+    Raises `InputError`, which names the key, what was found and what is allowed.
     """
     name = table.text("id")
     tooling = table.text("tooling", choices=tuple(toolings), names_of="toolings")

@@ -32,16 +32,8 @@ def is_xml(raw: bytes) -> bool:
 def hsm_entries(raw: bytes, where: str) -> list[dict[str, Any]]:
     """Return the tools of a library.
 
-    Parameters
-    ----------
-    raw : bytes
-    where : str
-        The file, for the messages.
-
-    Raises
-    ------
-    InputError
-        The file is no XML, or declares entities, which may stand for any size.
+    `where`: the file, for the messages
+    Raises `InputError`: the file is no XML, or declares entities, which may stand for any size.
     """
     try:
         text = raw.decode("utf-16" if raw.startswith(_UTF16) else "utf-8-sig")

@@ -185,15 +185,9 @@ def check_type(kind: str) -> None:
 def shape_keys(kind: str, geometry: Table, scale: float, notes: list[str]) -> Keys:
     """Return the keys of ``[cutter]`` that draw a tool of a type; none of a plain cylinder.
 
-    Parameters
-    ----------
-    kind : str
-        One that `check_type` lets through.
-    geometry : Table
-    scale : float [mm]
-        Of the library's unit.
-    notes : list of str
-        Where to say what was assumed.
+    `kind`: one that `check_type` lets through
+    `scale` [mm]: of the library's unit
+    `notes`: where to say what was assumed
     """
     keys = _TYPES[kind](_Told(geometry, scale, notes))
     return {key: str(value) if isinstance(value, CutterShape) else value for key, value in keys.items()}
@@ -224,16 +218,10 @@ def iso_geometry(properties: Mapping[str, Any]) -> dict[str, Any]:
 def iso_shape_keys(shape: str | None, geometry: Table, scale: float, notes: list[str]) -> Keys:
     """Return the keys of ``[cutter]`` that properties of ISO 13399 draw.
 
-    Parameters
-    ----------
-    shape : str or None
-        One of `CutterShape`; None takes it from the properties.
-    geometry : Table
-        DC, RE, KAPR or PSIR, APMX, DCX, BS, PRFRAD, CHW, KCH.
-    scale : float [mm]
-        Of the unit of lengths.
-    notes : list of str
-        Where to say what was taken for what.
+    `shape`: one of `CutterShape`; None takes it from the properties
+    `geometry`: DC, RE, KAPR or PSIR, APMX, DCX, BS, PRFRAD, CHW, KCH
+    `scale` [mm]: of the unit of lengths
+    `notes`: where to say what was taken for what
     """
     told = _Told(geometry, scale, notes)
     kappa = told.angle("KAPR", 179.0) if "KAPR" in geometry else 90.0 - told.angle("PSIR") if "PSIR" in geometry else None

@@ -59,22 +59,10 @@ STEADY = Changes()
 class MachineFile:
     """What a machine file says.
 
-    Parameters
-    ----------
-    name : str
-    spindle : VirtualSpindle
-    sensors : SensorSuite
-    workpiece : Workpiece
-    plan : CutPlan
-    toolings : tuple of Path
-        Tooling files of the cuts.
-    truth_toolings : tuple of Path
-        Toolings that never cut, whose receptances are wanted.
-    disturbances : Disturbances
-    workpiece_side : VirtualWorkpieceSide or None
-        What gives way under the workpiece, with a pair of accelerometers on it; None where it is rigid.
-    changes : Changes
-        What is not the same in every cut.
+    `toolings`: tooling files of the cuts
+    `truth_toolings`: toolings that never cut, whose receptances are wanted
+    `workpiece_side`: what gives way under the workpiece, with a pair of accelerometers on it; None where it is rigid
+    `changes`: what is not the same in every cut
     """
 
     name: str
@@ -93,15 +81,8 @@ class MachineFile:
 class RobotSetup:
     """A virtual robot with the sensors of a virtual machine, what it cuts at each of some postures, and how.
 
-    Parameters
-    ----------
-    robot : VirtualRobot
-    postures : array, shape (c, j) [rad]
-    sensors : SensorSuite
-    workpiece : Workpiece
-    plan : CutPlan
-        Of the cuts of each tooling at each posture; the feed is told in the spindle's X-Y plane.
-    disturbances : Disturbances
+    `postures` [rad], shape (c, j)
+    `plan`: of the cuts of each tooling at each posture; the feed is told in the spindle's X-Y plane
     """
 
     robot: VirtualRobot
@@ -130,10 +111,7 @@ class RobotSetup:
 def read_machine(path: str | Path) -> MachineFile:
     """Return what a machine file says; paths of toolings are relative to it.
 
-    Raises
-    ------
-    InputError
-        Names the file, the key, what was found and what is allowed.
+    Raises `InputError`, which names the file, the key, what was found and what is allowed.
     """
     path = Path(path)
     return machine_of(read_toml(path, "machine"), str(path), path.stem, path.parent)
@@ -142,16 +120,10 @@ def read_machine(path: str | Path) -> MachineFile:
 def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> MachineFile:
     """Return what a machine's table of keys says, as `read_machine` finds it in a file.
 
-    Parameters
-    ----------
-    data : mapping
-        The table's keys.
-    where : str
-        The file, for the messages.
-    name : str
-        Counts where the table has none.
-    folder : Path
-        That paths of toolings are relative to.
+    `data`: the table's keys
+    `where`: the file, for the messages
+    `name`: counts where the table has none
+    `folder`: that paths of toolings are relative to
     """
     top = Table(data, where, known=_TOP)
     head = top.table("machine", ("name", "gyroscopic"), {})

@@ -26,15 +26,8 @@ _SAME = 0.01
 def read_modes_files(texts: Sequence[str]) -> ModesFile:
     """Return the modes of MODES.toml, or of modal files, each named with its direction.
 
-    Parameters
-    ----------
-    texts : sequence of str
-        ``MODES.toml`` alone, or ``X=FILE.cmp`` and others.
-
-    Raises
-    ------
-    InputError
-        Names the file, the line, what was found and what is allowed.
+    `texts`: ``MODES.toml`` alone, or ``X=FILE.cmp`` and others
+    Raises `InputError`, which names the file, the line, what was found and what is allowed.
     """
     found: dict[str, list[dict[str, float]]] = {}
     for text in texts:
@@ -54,10 +47,7 @@ def read_modes_files(texts: Sequence[str]) -> ModesFile:
 def read_cmp(path: str | Path) -> list[dict[str, float]]:
     """Return the modes of a modal file as the tables of MODES.toml have them.
 
-    Raises
-    ------
-    InputError
-        Names the line; a mass, a stiffness, a frequency and a mode shape that contradict each other are refused.
+    Raises `InputError`, which names the line; a mass, a stiffness, a frequency and a mode shape that contradict each other are refused.
     """
     where = str(path)
     told: dict[str, list[tuple[float, int]]] = {}

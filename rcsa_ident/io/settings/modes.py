@@ -46,21 +46,12 @@ _WIDEST = 2.0
 class ModesFile:
     """What stands in MODES.toml.
 
-    Parameters
-    ----------
-    modes : TipModes
-        In X and Y, and in Z where one of them moves along it; X before Y before Z before those of any direction.
-    spreads : array, shape (3, m)
-        Standard deviations of natural frequencies, damping ratios and stiffnesses (or masses) over the values; NaN where the file tells
-        none.
-    coefficients : CuttingCoefficients or None
-    coefficient_spreads : (float, float)
-        Standard deviations of K_tc and K_rc over the values, NaN where the file tells none.
-    softening : float [s/rad]
-        As of `UncertainTip`.
-    missing : str
-        The first standard deviation that the file does not tell; empty where it tells all.
-    where : str
+    `modes`: in X and Y, and in Z where one of them moves along it; X before Y before Z before those of any direction
+    `spreads`, shape (3, m): standard deviations of natural frequencies, damping ratios and stiffnesses (or masses) over the values; NaN
+        where the file tells none
+    `coefficient_spreads`: (float, float); standard deviations of K_tc and K_rc over the values, NaN where the file tells none
+    `softening` [s/rad]: as of `UncertainTip`
+    `missing`: the first standard deviation that the file does not tell; empty where it tells all
     """
 
     modes: TipModes
@@ -74,15 +65,8 @@ class ModesFile:
     def uncertain_tip(self, coefficients: CuttingCoefficients | None = None) -> tuple[UncertainTip, CuttingCoefficients]:
         """Return modes and coefficients with their standard deviations, which labelled cuts go on from.
 
-        Parameters
-        ----------
-        coefficients : CuttingCoefficients, optional
-            With their own spreads, where the file has none.
-
-        Raises
-        ------
-        InputError
-            If a standard deviation is missing, or nothing tells the coefficients.
+        `coefficients`: with their own spreads, where the file has none
+        Raises `InputError` if a standard deviation is missing, or nothing tells the coefficients.
         """
         top = Table({}, self.where)
         if self.missing:
@@ -102,10 +86,7 @@ class ModesFile:
 def read_modes_file(path: str | Path) -> ModesFile:
     """Return the modes with what is told of their spread and of the coefficients.
 
-    Raises
-    ------
-    InputError
-        Names the file, the key, what was found and what is allowed.
+    Raises `InputError`, which names the file, the key, what was found and what is allowed.
     """
     return modes_of(read_toml(path, "modes"), str(path))
 
@@ -113,10 +94,8 @@ def read_modes_file(path: str | Path) -> ModesFile:
 def write_modes(path: str | Path, tip: TipModes) -> None:
     """Write the modes of a tip to MODES.toml, each with its direction cosines and its stiffness.
 
-    Raises
-    ------
-    InputError
-        If a mode does not move along a line, or modes are not all: a residual compliance, slopes or a shape along the edge stand beside.
+    Raises `InputError` if a mode does not move along a line, or modes are not all: a residual compliance, slopes or a shape along the edge
+        stand beside.
     """
     # of a normal mode the residue is psi psi^T / (2 i omega_d)
     square = 2j * tip.pole.imag[:, None, None] * tip.outputs.T[:, :, None] * tip.inputs[:, None, :]

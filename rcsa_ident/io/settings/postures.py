@@ -23,10 +23,7 @@ def read_postures(path: str | Path, robot: RobotModel) -> FloatArray:
 
     Columns ``q1_deg``, ``q2_deg`` and so on.
 
-    Raises
-    ------
-    InputError
-        Names the file, the line, and the joint that does not get there.
+    Raises `InputError`, which names the file, the line, and the joint that does not get there.
     """
     table = read_table(path, "postures")
     found = np.radians(finite_columns(table, posture_columns(len(robot.joints))))

@@ -37,10 +37,7 @@ def posture_columns(joints: int) -> tuple[str, ...]:
 def read_static_tests(path: str | Path, joints: int) -> StaticTests:
     """Return the tests of a table, of an arm with so many joints.
 
-    Raises
-    ------
-    InputError
-        Names the file, and the column or line that is missing or wrong.
+    Raises `InputError`, which names the file, and the column or line that is missing or wrong.
     """
     table = read_table(path, "static tests")
     values = {}
@@ -72,13 +69,7 @@ def read_static_tests(path: str | Path, joints: int) -> StaticTests:
 
 
 def finite_columns(table: TextTable, names: tuple[str, ...]) -> FloatArray:
-    """Return the named columns of a table, shape (t, k), finite numbers all.
-
-    Raises
-    ------
-    InputError
-        Names the column and the line.
-    """
+    """Return the named columns of a table, shape (t, k), finite numbers all. Raises `InputError`, which names the column and the line."""
     table.check_header(names, f"columns {', '.join(names)}")
     values = np.stack(table.columns(names), axis=1)
     wrong = np.argwhere(~np.isfinite(values))

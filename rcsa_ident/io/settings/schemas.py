@@ -258,13 +258,7 @@ SCHEMAS = tuple(_FILES)
 
 @cache
 def schema_of(name: str) -> dict[str, Any]:
-    """Return the JSON Schema of one of `SCHEMAS`.
-
-    Raises
-    ------
-    KeyError
-        If there is none of that name.
-    """
+    """Return the JSON Schema of one of `SCHEMAS`. Raises `KeyError` if there is none of that name."""
     title, read, files = _FILES[name]
     visits: dict[str, list[Asked]] = {}
     for data in files:

@@ -62,16 +62,10 @@ def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
 def tooling_of(data: Mapping[str, Any], where: str, name: str, tip_known: bool = False) -> Tooling:
     """Return the tooling of a table of keys as `read_tooling` finds it in a file; `name` counts where the table has none.
 
-    Parameters
-    ----------
-    data : mapping
-        The table's keys.
-    where : str
-        The file, for the messages.
-    name : str
-        Counts where the table has none.
-    tip_known : bool
-        As of `read_tooling`.
+    `data`: the table's keys
+    `where`: the file, for the messages
+    `name`: counts where the table has none
+    `tip_known`: as of `read_tooling`
     """
     top = Table(data, where, known=_TOOLING)
     if tip_known and "tool" not in data and "holder" not in data:
@@ -199,18 +193,11 @@ def campaign_of(
 ) -> Campaign:
     """Return the campaign of a table of keys as `read_campaign` finds it in a file.
 
-    Parameters
-    ----------
-    data : mapping
-        The table's keys.
-    where : str
-        The file, for the messages.
-    name : str
-        Counts where the table has none.
-    tooling : callable
-        Given the table ``[toolings]`` and one of its keys, returns that tooling.
-    locate : callable
-        Given the table of a cut and its key ``cut`` or ``air``, or that of a hammer test and ``file``, returns the file.
+    `data`: the table's keys
+    `where`: the file, for the messages
+    `name`: counts where the table has none
+    `tooling`: given the table ``[toolings]`` and one of its keys, returns that tooling
+    `locate`: given the table of a cut and its key ``cut`` or ``air``, or that of a hammer test and ``file``, returns the file
     """
     top = Table(data, where, known=_CAMPAIGN)
     head = top.table("campaign", keys_of(CAMPAIGN), {})
@@ -262,14 +249,9 @@ def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
 def sensor_of(name: str, data: Any, where: str) -> Sensor:
     """Return the sensor of one table, whose key is the channel's name; also a result file carries such tables.
 
-    Parameters
-    ----------
-    name : str
-        The channel's.
-    data : mapping
-        The table's keys.
-    where : str
-        The file, for the messages.
+    `name`: the channel's
+    `data`: mapping, the table's keys
+    `where`: the file, for the messages
     """
     kind = Table(data, where, f"sensors.{name}", sorted(keys_of(SENSOR)))
     quantity = Quantity(kind.text("quantity", choices=CAMPAIGN_QUANTITIES))

@@ -36,15 +36,10 @@ _FILE_NAME = re.compile(r"\w[\w .+()-]*")
 class SimulatedCampaign:
     """Where a simulated campaign was written.
 
-    Parameters
-    ----------
-    folder : Path
-    truth : Path
-        ``tip/``, ``cross/``, ``spindle.csv``: receptances at the mean of the speeds, with the terms between X and Y where there are
-        some; ``tip/`` and ``cross/`` of a machine that changes with the speed also at the slowest and the fastest.
-        ``workpiece_side.csv``: what gives way under the workpiece, where something does. ``records.csv``:
-        true speeds and tooth angles at the first sample; ``forces/``: lines of the true force. No reader of the folder sees it.
-    cuts : int
+    `truth`: ``tip/``, ``cross/``, ``spindle.csv``: receptances at the mean of the speeds, with the terms between X and Y where there are
+        some; ``tip/`` and ``cross/`` of a machine that changes with the speed also at the slowest and the fastest. ``workpiece_side.csv``:
+        what gives way under the workpiece, where something does. ``records.csv``: true speeds and tooth angles at the first sample;
+        ``forces/``: lines of the true force. No reader of the folder sees it.
     """
 
     folder: Path
@@ -64,21 +59,12 @@ def write_simulation(
 ) -> SimulatedCampaign:
     """Write the campaign into `out` and the truth into ``<out>.truth``; whoever ends it half-way finds neither.
 
-    Parameters
-    ----------
-    out : path
-        A folder that does not exist yet, or an empty one.
-    setup : MachineFile
-        The virtual machine and its plan of cuts.
-    toolings : sequence of Tooling
-        Those of the cuts, in the order of ``setup.toolings``.
-    cuts : iterable of SimulatedCut
-    receptances : iterable of TrueReceptances
-    flange : TrueFlange
-        Receptances of the bare spindle.
-    progress : callable of (done, total), optional
-    seed : int
-        Of the cuts.
+    `out`: a folder that does not exist yet, or an empty one
+    `setup`: the virtual machine and its plan of cuts
+    `toolings`: those of the cuts, in the order of ``setup.toolings``
+    `flange`: receptances of the bare spindle
+    `progress`: callable of (done, total)
+    `seed`: of the cuts
     """
     out = Path(out)
     truth = out.with_name(out.name + ".truth")
@@ -122,12 +108,8 @@ def true_name(tooling: str, speed: float | None = None) -> str:
 def _directions(values: ComplexArray, entries: tuple[str, ...] = ("",)) -> tuple[list[str], ComplexArray]:
     """Names and columns of receptances over both axes: X, Y, and motion in X under a force in Y and the reverse, where there are some.
 
-    Parameters
-    ----------
-    values : complex array, shape (n, 2, k, 2, k)
-        Axis and what moves there, axis and what acts there.
-    entries : tuple of str
-        Endings of the k * k names.
+    `values`, shape (n, 2, k, 2, k): axis and what moves there, axis and what acts there
+    `entries`: endings of the k * k names
     """
     chosen = [(0, 0), (1, 1)]
     if np.any(values[:, 0, :, 1]) or np.any(values[:, 1, :, 0]):
@@ -156,14 +138,7 @@ def campaign_text(setup: MachineFile, toolings: Sequence[Tooling], seed: int = 1
 
 
 def robot_campaign_text(name: str, setup: RobotSetup, toolings: Sequence[Tooling]) -> str:
-    """Return the same of a robot: each cut tells the posture that it was made at.
-
-    Parameters
-    ----------
-    name : str
-    setup : RobotSetup
-    toolings : sequence of Tooling
-    """
+    """Return the same of a robot: each cut tells the posture that it was made at."""
     plan = setup.plan
     cuts = [
         cut_keys(robot_cut_id(tooling.name, number, name), tooling.name, _conditions(plan, speed), last, posture.tolist())
@@ -184,16 +159,9 @@ def write_robot_campaign(
 ) -> None:
     """Write a robot's campaign into a folder; no truth beside it.
 
-    Parameters
-    ----------
-    out : path
-        A folder that does not exist yet, or an empty one.
-    name : str
-    setup : RobotSetup
-    toolings : mapping of Path to Tooling
-        Their files.
-    cuts : iterable of SimulatedCut
-    progress : callable of (done, total), optional
+    `out`: a folder that does not exist yet, or an empty one
+    `toolings`: their files
+    `progress`: callable of (done, total)
     """
     total = len(toolings) * len(setup.postures) * len(setup.plan.cuts)
     with filling(out, "out") as runs:

@@ -18,10 +18,7 @@ SPEED, POWER, TORQUE = "spindle_speed_rpm", "power_kw", "torque_nm"
 def read_spindle_drive(path: str | Path) -> SpindleDrive:
     """Return the drive of a table with `SPEED` and `POWER`, `TORQUE` or both; its highest speed is the spindle's.
 
-    Raises
-    ------
-    InputError
-        Names the file and the line.
+    Raises `InputError`, which names the file and the line.
     """
     table = read_table(path, "spindle")
     names = [name for name in (POWER, TORQUE) if name in table.header]

@@ -22,10 +22,7 @@ def read_stickouts(path: str | Path, stickouts: Sequence[float]) -> list[Tooling
 
     The tool of the file keeps its length: where it is too short for the file's insertion it sits less deep in the bore.
 
-    Raises
-    ------
-    InputError
-        If a stickout leaves less than `LEAST_INSERTION` diameters in the holder.
+    Raises `InputError` if a stickout leaves less than `LEAST_INSERTION` diameters in the holder.
     """
     tooling = read_tooling(path)
     top = Table(read_toml(path, "tooling"), str(path))

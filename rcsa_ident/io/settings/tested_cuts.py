@@ -21,10 +21,7 @@ CHATTER = "chatter_frequency_hz"
 def read_tested_cuts(path: str | Path) -> TestedCuts:
     """Return the cuts of a table with the columns `COLUMNS`, with or without `CHATTER`.
 
-    Raises
-    ------
-    InputError
-        Names the file and the line.
+    Raises `InputError`, which names the file and the line.
     """
     return _cuts_of(read_table(path, "tested cuts"))
 
@@ -75,14 +72,7 @@ def _chatter(table: TextTable) -> FloatArray:
 
 
 def write_tests(path: str | Path, cuts: TestedCuts, probability: FloatArray) -> None:
-    """Write TESTS.csv: each tested cut with the probability that it is stable.
-
-    Parameters
-    ----------
-    path : path
-    cuts : TestedCuts
-    probability : array, shape (n,)
-    """
+    """Write TESTS.csv: each tested cut with the probability that it is stable. `probability`, shape (n,)."""
     rows = zip(to_rpm(cuts.spindle_speed), 1e3 * cuts.axial_depth, cuts.verdict, probability, strict=True)
     lines = [f"{speed:.10g},{depth:.10g},{verdict},{p:.6g}" for speed, depth, verdict, p in rows]
     write_text(path, "\n".join([",".join((*COLUMNS, "probability_stable")), *lines, ""]))

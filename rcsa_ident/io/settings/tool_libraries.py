@@ -54,22 +54,13 @@ _BODIES = {"carbide": _CARBIDE, "hss": _STEEL, "hssco": _STEEL}
 class Assumptions:
     """What a library cannot tell.
 
-    Parameters
-    ----------
-    flute_ratio : float
-        Diameter of the solid cylinder that bends as the fluted part, over the cutting diameter.
-    helix_deg : float [deg]
-        Helix of tools for which the library gives none.
-    stickout_mm, insertion_mm : float or None [mm]
-        None takes the library's length below the holder, and what is left of the tool behind it.
-    material : str or None
-        Material of the tools; None takes the library's.
-    contact : Contact or None
-        Contact of tool and holder; None assumes the catalogue's.
-    spread : Spread or None
-        How well that contact is known, where its tooling states it.
-    holder : str or None
-        Holder of the library for tools that have none of their own.
+    `flute_ratio`: diameter of the solid cylinder that bends as the fluted part, over the cutting diameter
+    `helix_deg` [deg]: helix of tools for which the library gives none
+    `stickout_mm`, `insertion_mm` [mm]: None takes the library's length below the holder, and what is left of the tool behind it
+    `material`: material of the tools; None takes the library's
+    `contact`: contact of tool and holder; None assumes the catalogue's
+    `spread`: how well that contact is known, where its tooling states it
+    `holder`: holder of the library for tools that have none of their own
     """
 
     flute_ratio: float = 0.8
@@ -97,18 +88,10 @@ class Assumptions:
 class Imported(NamedTuple):
     """An entry of a library.
 
-    Parameters
-    ----------
-    number : int
-        Place in the library, from 1.
-    name, kind : str
-    tooling : Tooling or None
-    text : str
-        The tooling as TOML, its notes as comments; empty without one.
-    notes : tuple of str
-        What was assumed.
-    reason : str
-        Why there is no tooling.
+    `number`: place in the library, from 1
+    `text`: the tooling as TOML, its notes as comments; empty without one
+    `notes`: what was assumed
+    `reason`: why there is no tooling
     """
 
     number: int
@@ -123,10 +106,7 @@ class Imported(NamedTuple):
 def read_tool_library(path: str | Path, assumptions: Assumptions | None = None) -> list[Imported]:
     """Return every entry of a library file, with a tooling or with the reason why there is none.
 
-    Raises
-    ------
-    InputError
-        The file as a whole is no library.
+    Raises `InputError`: the file as a whole is no library.
     """
     return import_tools(read_bytes(path, "tool library", LARGEST_LIBRARY), str(path), assumptions)
 
@@ -134,16 +114,10 @@ def read_tool_library(path: str | Path, assumptions: Assumptions | None = None) 
 def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None, most: int = MOST_ENTRIES) -> list[Imported]:
     """Return every entry of a library that is already in memory, at most so many, see `read_tool_library`.
 
-    Parameters
-    ----------
-    raw : bytes
-        The library's JSON.
-    where : str
-        The file, for the messages.
-    assumptions : Assumptions, optional
-        In place of what the library cannot tell.
-    most : int
-        Entries that are allowed.
+    `raw`: the library's JSON
+    `where`: the file, for the messages
+    `assumptions`: in place of what the library cannot tell
+    `most`: entries that are allowed
     """
     given = assumptions or Assumptions()
     content = _content(raw, where)

@@ -97,14 +97,7 @@ def typical_contact_keys(typical: TypicalContact | None) -> dict[str, Any] | Non
 
 
 def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
-    """Return the text of a tooling file of its keys, or of those parts of one that are there.
-
-    Parameters
-    ----------
-    data : mapping
-    notes : sequence of str
-        Remarks in front of it.
-    """
+    """Return the text of a tooling file of its keys, or of those parts of one that are there. `notes`: remarks in front of it."""
     # metres and back leave a last digit that nobody wrote
     return toml_of(data, notes, digits=12)
 

@@ -47,18 +47,10 @@ def read_urdf(
     Links that fixed joints hold together are one body. Off the diagonal the moments of inertia are the tensor's own; an inertial frame that
     is turned is turned back. Meshes are not read. The tool point is the flange.
 
-    Parameters
-    ----------
-    path : path
-    stiffness, damping : sequences of float [N m/rad], [N m s/rad]
-        Of each joint from the base on, or one for all: URDF does not tell how far a joint gives way.
-    flange : str, optional
-        The link whose axes are the robot's flange; by default the last one of an arm without branches.
-
-    Raises
-    ------
-    InputError
-        It names the element, what stands there, and what may.
+    `stiffness`, `damping`: sequences of float [N m/rad], [N m s/rad]; of each joint from the base on, or one for all: URDF does not tell
+        how far a joint gives way
+    `flange`: the link whose axes are the robot's flange; by default the last one of an arm without branches
+    Raises `InputError`, which names the element, what stands there, and what may.
     """
     where = str(path)
     try:
@@ -193,14 +185,8 @@ def _three(element: ElementTree.Element, key: str, place: str, default: FloatArr
 class _Tree:
     """Links and the joints between them: one root, and no link behind two joints.
 
-    Parameters
-    ----------
-    root : str
-    links : dict
-    above : dict
-        The joint that a link hangs on, by the link's name.
-    below : dict
-        The joints that leave a link, by the link's name.
+    `above`: the joint that a link hangs on, by the link's name
+    `below`: the joints that leave a link, by the link's name
     """
 
     root: str

@@ -24,10 +24,7 @@ def workpiece_of(table: Table) -> Workpiece:
 def workpiece_keys(workpiece: Workpiece, all_spreads: bool = False) -> dict[str, Any]:
     """Return a workpiece as a file holds it; forces that are zero are left away.
 
-    Parameters
-    ----------
-    all_spreads : bool
-        Also those that a reader would take anyway.
+    `all_spreads`: also those that a reader would take anyway
     """
     c = workpiece.coefficients
     data: dict[str, Any] = {"name": workpiece.name, "tangential_coefficient_mpa": c.tangential * 1e-6, "radial_ratio": c.radial_ratio}

@@ -26,17 +26,13 @@ class CarriedSpindle:
     The housing's mass, and the shaft's as if it were rigid, are the payload's. The modes are the same at every posture: what the wrist
     weighs there comes in by the pull.
 
-    Parameters
-    ----------
-    omega_n : array, shape (m,) [rad/s]
-    damping : array, shape (m, m) [rad/s]
-        In modal coordinates, symmetric.
-    psi : array, shape (m, 4) [1/sqrt(kg)], [1/(m sqrt(kg))]
-        Mass-normalised shapes at the flange, against the housing: translation and slope in X, then in Y.
-    pull : array, shape (m, 4) [sqrt(kg)], [m sqrt(kg)]
-        psi^T M of a unit motion of the whole spindle in these directions: its squares sum up to the mass that can swing.
-    residual : array, shape (4, 4) [m/N], [rad/N], [rad/(N m)]
-        Compliance of all higher modes, symmetric.
+    `omega_n` [rad/s], shape (m,)
+    `damping` [rad/s], shape (m, m): in modal coordinates, symmetric
+    `psi`: array, shape (m, 4) [1/sqrt(kg)], [1/(m sqrt(kg))]; mass-normalised shapes at the flange, against the housing: translation and
+        slope in X, then in Y
+    `pull`: array, shape (m, 4) [sqrt(kg)], [m sqrt(kg)]; psi^T M of a unit motion of the whole spindle in these directions: its squares sum
+        up to the mass that can swing
+    `residual`: array, shape (4, 4) [m/N], [rad/N], [rad/(N m)]; compliance of all higher modes, symmetric
 
     Examples
     --------
@@ -76,15 +72,8 @@ class CarriedSpindle:
     def on(self, arm: Structure) -> Structure:
         """Return arm and spindle as one structure over the arm's six directions; without the residual.
 
-        Parameters
-        ----------
-        arm : Structure
-            Over six directions where the tool-holder sits, the bending ones first.
-
-        Raises
-        ------
-        InputError
-            If the modes would swing more mass than the hand carries.
+        `arm`: over six directions where the tool-holder sits, the bending ones first
+        Raises `InputError` if the modes would swing more mass than the hand carries.
         """
         hand = arm.ports
         n, m = hand.shape[0], self.omega_n.size

@@ -19,13 +19,8 @@ _STEPS, _RESTING = 50, 1e-13
 def static_compliance(robot: RobotModel, angles: FloatArray, tilts: bool = True) -> FloatArray:
     """Return J K^-1 J^T at the tool's place, in the base's axes, shape (6, 6) [m/N, rad/N, m/(N m), rad/(N m)].
 
-    Parameters
-    ----------
-    robot : RobotModel
-    angles : array, shape (j,) [rad]
-        Of the joints.
-    tilts : bool
-        With the springs across the joints' axes.
+    `angles` [rad], shape (j,): of the joints
+    `tilts`: with the springs across the joints' axes
     """
     chain = posed(robot, angles, tilts)
     motion = chain.jacobian(chain.flange.point(robot.tool_point.offset))
@@ -57,10 +52,7 @@ def twist_per_payload(robot: RobotModel, angles: FloatArray) -> FloatArray:
 
     At the payload's centre, J^T g / k, in the sense of `sag`: how well a posture tells the payload's mass from the joints' encoders.
 
-    Raises
-    ------
-    InputError
-        If the robot carries none.
+    Raises `InputError` if the robot carries none.
     """
     if robot.payload is None:
         raise InputError("payload", "none", "a robot that carries one")
@@ -71,13 +63,9 @@ def twist_per_payload(robot: RobotModel, angles: FloatArray) -> FloatArray:
 def spring_torques(robot: RobotModel, twist: FloatArray, rate: FloatArray, tilts: bool = True) -> FloatArray:
     """Return the torques of all springs and dampers on the links, shape (n,) [N m].
 
-    Parameters
-    ----------
-    robot : RobotModel
-    twist : array, shape (n,) [rad]
-        How far each freedom stands from where its drive holds it; within the play on both sides a drive's spring feels nothing.
-    rate : array, shape (n,) [rad/s]
-    tilts : bool
+    `twist` [rad], shape (n,): how far each freedom stands from where its drive holds it; within the play on both sides a drive's spring
+        feels nothing
+    `rate` [rad/s], shape (n,)
     """
     chain = robot.chain(tilts)
     play = np.zeros(chain.mass.size)
@@ -91,11 +79,7 @@ def spring_twist(robot: RobotModel, torque: FloatArray, tilts: bool = True) -> F
 
     The other way around of `spring_torques` at rest, which holds -torque then; below `PLAY_HELD` a drive's play lies in the middle.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    torque : array, shape (n,) [N m]
-    tilts : bool
+    `torque` [N m], shape (n,)
     """
     chain = robot.chain(tilts)
     given = np.asarray(torque, dtype=float)
@@ -107,19 +91,9 @@ def spring_twist(robot: RobotModel, torque: FloatArray, tilts: bool = True) -> F
 def at_rest(robot: RobotModel, angles: FloatArray, force: FloatArray, tilts: bool = True) -> FloatArray:
     """Return all angles at which the springs hold a force at the tool's place, shape (n,) [rad], the arm's weight left aside.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    angles : array, shape (j,) [rad]
-        That the drives hold.
-    force : array, shape (6,) [N, N m]
-        In the base's axes, wherever the tool gives way to.
-    tilts : bool
-
-    Raises
-    ------
-    InputError
-        If nothing holds it: a force that turns the arm further than its springs turn it back.
+    `angles` [rad], shape (j,): that the drives hold
+    `force` [N, N m], shape (6,): in the base's axes, wherever the tool gives way to
+    Raises `InputError` if nothing holds it: a force that turns the arm further than its springs turn it back.
     """
     held = _all(robot, angles, tilts)
     there = held

@@ -22,11 +22,7 @@ def mass_matrix(chain: PosedChain) -> FloatArray:
 def torques(chain: PosedChain, rate: FloatArray, acceleration: FloatArray, gravity: FloatArray) -> FloatArray:
     """Return the torques of a motion, M q'' + c(q, q') + g(q), shape (n,) [N m].
 
-    Parameters
-    ----------
-    chain : PosedChain
-    rate, acceleration : arrays, shape (n,) [rad/s, rad/s^2]
-    gravity : array, shape (3,) [m/s^2]
+    `rate`, `acceleration` [rad/s, rad/s^2], shape (n,); `gravity` [m/s^2], shape (3,)
     """
     own, out = chain.chain, np.empty(chain.origin.shape[0])
     spin, gain, fall = (np.asarray(each, dtype=float) for each in (rate, acceleration, gravity))

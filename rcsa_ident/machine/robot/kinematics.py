@@ -21,12 +21,8 @@ _BEYOND_ONE = 1e-9
 class PosedChain:
     """A chain of freedoms whose frames have been worked out at some angles, in the axes of the base.
 
-    Parameters
-    ----------
-    chain : Chain
-    rotation, origin, direction : arrays, shapes (n, 3, 3), (n, 3), (n, 3)
-        Each frame's axes as columns, its origin, and its joint's axis.
-    flange : Frame
+    `rotation`, `origin`, `direction`: arrays, shapes (n, 3, 3), (n, 3), (n, 3); each frame's axes as columns, its origin, and its joint's
+        axis
     """
 
     chain: Chain
@@ -38,10 +34,7 @@ class PosedChain:
     def jacobian(self, point: FloatArray) -> FloatArray:
         """Return the motion of a point of the last link with each angle, translations [m/rad] before rotations, shape (6, n).
 
-        Parameters
-        ----------
-        point : array, shape (3,) [m]
-            In the axes of the base.
+        `point` [m], shape (3,): in the axes of the base
         """
         out = np.empty((6, self.origin.shape[0]))
         _kernels.jacobian(self.origin, self.direction, np.asarray(point, dtype=float), out)
@@ -51,13 +44,8 @@ class PosedChain:
 def posed(robot: RobotModel, angles: FloatArray, tilts: bool = False, payload: bool = True) -> PosedChain:
     """Return a robot's frames at some angles.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    angles : array, shape (j,) or (n,) [rad]
-        Of the joints, nothing tilting; or of all freedoms.
-    tilts, payload : bool
-        As in `RobotModel.chain`.
+    `angles`: array, shape (j,) or (n,) [rad]; of the joints, nothing tilting; or of all freedoms
+    `tilts`, `payload`: as in `RobotModel.chain`
     """
     chain = robot.chain(tilts, payload)
     angles = np.asarray(angles, dtype=float)
@@ -86,20 +74,10 @@ def postures_of(robot: RobotModel, flange: Frame, within_limits: bool = True, ne
     first angle brings the wrist to its distance from the plane of the second link, the third to its distance from the second axis, and the
     fifth turns the last axis to its angle with the fourth; each has two solutions.
 
-    Parameters
-    ----------
-    robot : RobotModel
-    flange : Frame
-        As seen from the base.
-    within_limits : bool
-        Only postures that the joints' limits allow; else angles within half a turn.
-    near : array, shape (6,) [rad], default zero
-        Of the whole turns that limits leave to an angle, those nearest to this posture.
-
-    Raises
-    ------
-    InputError
-        If the arm is not of that kind.
+    `flange`: as seen from the base
+    `within_limits`: only postures that the joints' limits allow; else angles within half a turn
+    `near`: array, shape (6,) [rad], default zero; of the whole turns that limits leave to an angle, those nearest to this posture
+    Raises `InputError` if the arm is not of that kind.
     """
     arm = _Arm.of(robot)
     rotation = flange.turn @ arm.zero.turn.T

@@ -23,12 +23,8 @@ _STEEL = 7850.0
 class Frame:
     """Axes at a place, as seen from others.
 
-    Parameters
-    ----------
-    turn : array, shape (3, 3)
-        Its axes as columns.
-    offset : array, shape (3,) [m]
-        Its origin.
+    `turn`, shape (3, 3): its axes as columns
+    `offset` [m], shape (3,): its origin
 
     Examples
     --------
@@ -65,13 +61,9 @@ class Frame:
 class Body:
     """A rigid body in the axes of the frame that carries it.
 
-    Parameters
-    ----------
-    mass : float [kg]
-    centre : array, shape (3,) [m]
-        Centre of mass.
-    inertia : array, shape (3, 3) [kg m^2]
-        About the centre; the entries off the diagonal are the tensor's own.
+    `mass` [kg]
+    `centre` [m], shape (3,): centre of mass
+    `inertia` [kg m^2], shape (3, 3): about the centre; the entries off the diagonal are the tensor's own
     """
 
     mass: float
@@ -127,12 +119,8 @@ class Body:
 class Tilt:
     """A spring across a joint's own axis: what its bearings and the links beside it give way.
 
-    Parameters
-    ----------
-    axis : array, shape (3,)
-        Unit vector in the joint's frame.
-    stiffness : float [N m/rad]
-    damping : float [N m s/rad]
+    `axis`, shape (3,): unit vector in the joint's frame
+    `stiffness` [N m/rad]; `damping` [N m s/rad]
     """
 
     axis: FloatArray
@@ -149,25 +137,15 @@ class Tilt:
 class Joint:
     """A driven joint and the link that it moves.
 
-    Parameters
-    ----------
-    name : str
-    frame : Frame
-        Where it stands in the link before it, at angle zero.
-    axis : array, shape (3,)
-        Unit vector in its own frame; its sign is that of the robot's own angle.
-    body : Body
-        The link, in the joint's frame.
-    stiffness : float [N m/rad]
-        Of drive and gear, at the link.
-    damping : float [N m s/rad]
-    backlash : float [rad]
-        Half of the play: how far the link may leave the drive before the spring feels it.
-    tilts : tuple of Tilt
-        In the order in which they turn, behind the joint's own turn.
-    limits : (float, float) [rad]
-    gravity_compensated : bool
-        Whether the control takes the sag of this joint's spring under the arm's own weight out.
+    `frame`: where it stands in the link before it, at angle zero
+    `axis`, shape (3,): unit vector in its own frame; its sign is that of the robot's own angle
+    `body`: the link, in the joint's frame
+    `stiffness` [N m/rad]: of drive and gear, at the link
+    `damping` [N m s/rad]
+    `backlash` [rad]: half of the play: how far the link may leave the drive before the spring feels it
+    `tilts`: in the order in which they turn, behind the joint's own turn
+    `limits`: (float, float) [rad]
+    `gravity_compensated`: whether the control takes the sag of this joint's spring under the arm's own weight out
     """
 
     name: str
@@ -197,13 +175,10 @@ _Spring = TypeVar("_Spring", Joint, Tilt)
 class Chain(NamedTuple):
     """The freedoms of a robot one after the other, as the kernels read them; see `rcsa_ident.machine.robot._kernels`.
 
-    Parameters
-    ----------
-    turn, offset, axis : arrays, shapes (n, 3, 3), (n, 3), (n, 3)
-    mass, centre, inertia : arrays, shapes (n,), (n, 3), (n, 3, 3)
-    stiffness, damping : arrays, shape (n,)
-    driven : array of int, shape (j,)
-        The freedoms that are the joints' own angles.
+    `turn`, `offset`, `axis`: arrays, shapes (n, 3, 3), (n, 3), (n, 3)
+    `mass`, `centre`, `inertia`: arrays, shapes (n,), (n, 3), (n, 3, 3)
+    `stiffness`, `damping`, shape (n,)
+    `driven`: array of int, shape (j,); the freedoms that are the joints' own angles
     """
 
     turn: FloatArray

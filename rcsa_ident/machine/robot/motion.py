@@ -25,13 +25,8 @@ class ArmUnderForce:
 
     Drives that compensate gravity add the torque that the arm's weight asks of them where they are held.
 
-    Parameters
-    ----------
-    robot : FlexibleRobot
-    reach : float [m]
-        From the tool point to the tool's tip, along the tool.
-    weight : bool
-        Whether the arm has its weight; it holds the play of the joints that it loads on one side.
+    `reach` [m]: from the tool point to the tool's tip, along the tool
+    `weight`: whether the arm has its weight; it holds the play of the joints that it loads on one side
     """
 
     robot: FlexibleRobot
@@ -100,10 +95,7 @@ class ArmUnderForce:
     def at_rest(self, posture: FloatArray, force: FloatArray) -> FloatArray:
         """Return all angles, shape (n,) [rad], at which springs hold the weight and a force on the tip, the drives held at a posture.
 
-        Raises
-        ------
-        InputError
-            If nothing holds it.
+        Raises `InputError` if nothing holds it.
         """
         model, tilts = self.robot.model, self.robot.tilts
         held, still = model.chain(tilts).angles(model.posture(posture)), np.zeros(self.play.size)
@@ -120,18 +112,10 @@ class ArmUnderForce:
 
         The average acceleration [newmark1959] on the arm's whole equations, play and all.
 
-        Parameters
-        ----------
-        held : array, shape (t, j) [rad]
-            Of the drives.
-        force : array, shape (t, 3) [N]
-            On the tip, in the base's axes.
-        step : float [s]
-
-        Raises
-        ------
-        InputError
-            If no masses are known, or an instant has no solution: a motion or a force that the springs do not follow.
+        `held` [rad], shape (t, j): of the drives
+        `force` [N], shape (t, 3): on the tip, in the base's axes
+        `step` [s]
+        Raises `InputError` if no masses are known, or an instant has no solution: a motion or a force that the springs do not follow.
         """
         positive("step", step, "s")
         if not self.robot.model.weighed:

@@ -29,12 +29,8 @@ from rcsa_ident.machine.robot.model import Body, RobotModel
 def compliance_slopes(robot: RobotModel, angles: FloatArray, tilts: bool = True) -> FloatArray:
     """Return the change of `static_compliance` with each stiffness, shape (n, 6, 6) [per N m/rad].
 
-    Parameters
-    ----------
-    robot : RobotModel
-    angles : array, shape (j,) [rad]
-    tilts : bool
-        With the springs across the joints' axes; n freedoms in the order of the chain.
+    `angles` [rad], shape (j,)
+    `tilts`: with the springs across the joints' axes; n freedoms in the order of the chain
     """
     chain = posed(robot, angles, tilts)
     motion = chain.jacobian(chain.flange.point(robot.tool_point.offset)) / chain.chain.stiffness
@@ -45,12 +41,8 @@ def compliance_slopes(robot: RobotModel, angles: FloatArray, tilts: bool = True)
 class ReceptanceSlopes:
     """How a receptance changes, its directions as those of `FlexibleRobot.at`.
 
-    Parameters
-    ----------
-    stiffness, damping : complex arrays, shape (n, w, 6, 6)
-        With each freedom's [per N m/rad, per N m s/rad].
-    mass : complex array, shape (b, w, 6, 6)
-        With the mass of each body [per kg]: links from the base on, then the payload where there is one.
+    `stiffness`, `damping`, shape (n, w, 6, 6): with each freedom's [per N m/rad, per N m s/rad]
+    `mass`, shape (b, w, 6, 6): with the mass of each body [per kg]: links from the base on, then the payload where there is one
     """
 
     stiffness: ComplexArray
@@ -61,13 +53,8 @@ class ReceptanceSlopes:
 def receptance_slopes(robot: FlexibleRobot, angles: FloatArray, omega: FloatArray, turn: float = 0.0) -> ReceptanceSlopes:
     """Return the change of the receptance where the tool-holder sits.
 
-    Parameters
-    ----------
-    robot : FlexibleRobot
-    angles : array, shape (j,) [rad]
-    omega : array, shape (w,) [rad/s]
-    turn : float [rad]
-        As in `FlexibleRobot.at`.
+    `angles` [rad], shape (j,); `omega` [rad/s], shape (w,)
+    `turn` [rad]: as in `FlexibleRobot.at`
     """
     own, w = robot.at(angles, turn), np.asarray(omega, dtype=float)[:, None, None]
     dynamic = own.stiffness + 1j * w * own.damping - w**2 * own.mass
@@ -113,11 +100,7 @@ def regressor(chain: PosedChain, rate: FloatArray, acceleration: FloatArray, gra
     Of each link, in its frame's axes, pi holds the mass, the first moment m c (x, y, z) and the inertia about the frame's origin (xx, yy,
     zz, xy, yz, zx, the tensor's own signs): `inertial_parameters`. What hangs on the flange is part of the last link.
 
-    Parameters
-    ----------
-    chain : PosedChain
-    rate, acceleration : arrays, shape (n,) [rad/s, rad/s^2]
-    gravity : array, shape (3,) [m/s^2]
+    `rate`, `acceleration` [rad/s, rad/s^2], shape (n,); `gravity` [m/s^2], shape (3,)
     """
     n, last = chain.origin.shape[0], _carriers(chain)
     found = np.empty((n, 10 * last.size))

@@ -44,19 +44,12 @@ _ODDS, _MOST_SIDES = np.array([-0.87, 4.25, 0.60, 0.82]), 4.0
 class OffOrders:
     """Lines of what the orders leave.
 
-    Parameters
-    ----------
-    frequency : array, shape (l,) [Hz]
-        The structure's first, then the strongest.
-    share : float
-        Share of the record's power in the line that is most likely chatter, and in its sidebands.
-    beside : array, shape (k,)
-        Power of the lines that lie 1, 2, ..., k times the spindle's frequency beside it, to both sides.
-    evidence : array, shape (3,)
-        Decades: power of the line and its sidebands over that of the orders of the channel, of the line over the noise beside it, and the
-        probability of its sidebands by chance.
-    hum : float or None [Hz]
-        Mains whose multiples are there.
+    `frequency` [Hz], shape (l,): the structure's first, then the strongest
+    `share`: share of the record's power in the line that is most likely chatter, and in its sidebands
+    `beside`, shape (k,): power of the lines that lie 1, 2, ..., k times the spindle's frequency beside it, to both sides
+    `evidence`, shape (3,): decades: power of the line and its sidebands over that of the orders of the channel, of the line over the noise
+        beside it, and the probability of its sidebands by chance
+    `hum` [Hz]: mains whose multiples are there
     """
 
     frequency: FloatArray
@@ -91,22 +84,14 @@ def off_orders(
 ) -> OffOrders:
     """Return the lines of what is left of a record when its orders are taken away.
 
-    Parameters
-    ----------
-    rest : array, shape (n, c)
-    forced : array, shape (c,)
-        Mean square of the orders.
-    energy : float
-        Mean square of the record itself, all channels together.
-    rate : float [Hz]
-    orders : array, shape (m,) [Hz]
-        Where the orders 1, 2, ... stand in the spectrum.
-    band : float [Hz]
-        Highest frequency.
-    twice_differentiated : bool
-        Of accelerations the displacement says which line is the strongest.
-    teeth : int or None
-        As told, or heard.
+    `rest`, shape (n, c)
+    `forced`, shape (c,): mean square of the orders
+    `energy`: mean square of the record itself, all channels together
+    `rate` [Hz]
+    `orders` [Hz], shape (m,): where the orders 1, 2, ... stand in the spectrum
+    `band` [Hz]: highest frequency
+    `twice_differentiated`: of accelerations the displacement says which line is the strongest
+    `teeth`: as told, or heard
     """
     n, spindle = rest.shape[0], float(orders[0])
     length = min(round(_WINDOW * rate), n)

@@ -44,12 +44,7 @@ def summed(width: int) -> float:
 def false_alarm(scale: float, shape: float, cells: int = REFERENCE) -> float:
     """Return the probability that a cell of noise exceeds `scale` times the middle one of so many around it.
 
-    Parameters
-    ----------
-    scale : float
-    shape : float
-        Of the Gamma distribution of a cell: windows times bins that are averaged.
-    cells : int
+    `shape`: of the Gamma distribution of a cell: windows times bins that are averaged
 
     Examples
     --------
@@ -77,22 +72,12 @@ def scale_of(probability: float, shape: float, cells: int = REFERENCE) -> float:
 def stands_out(power: FloatArray, windows: float, probability: float, width: int = 1) -> tuple[np.ndarray, FloatArray]:
     """Return which cells of a spectrum are lines, and the noise in them.
 
-    Parameters
-    ----------
-    power : array, shape (b, c)
-        Mean over windows; of bins without lines of the orders only, as they follow each other.
-    windows : float
-        Independent windows in the mean.
-    probability : float
-        Of a false alarm in a cell.
-    width : int
-        Bins that are summed: lines that wander spread over several.
-
-    Returns
-    -------
-    line : array of bool, shape (b, c)
-    noise : array, shape (b, c)
-        Mean power of noise in a bin.
+    `power`, shape (b, c): mean over windows; of bins without lines of the orders only, as they follow each other
+    `windows`: independent windows in the mean
+    `probability`: of a false alarm in a cell
+    `width`: bins that are summed: lines that wander spread over several
+    Returns `line`, array of bool, shape (b, c).
+    Returns `noise`, array, shape (b, c): mean power of noise in a bin.
     """
     bins = power.shape[0]
     # cells that share bins, or the wings of a line, tell nothing of the noise beside it

@@ -19,15 +19,7 @@ _ENERGY = 3e-5
 
 
 class Exponentials(NamedTuple):
-    """Exponentials of one window.
-
-    Parameters
-    ----------
-    pole : complex array, shape (m,) [1/s]
-        Above the real axis.
-    amplitude : array, shape (m,)
-        At the window's first sample.
-    """
+    """Exponentials of one window. `pole` [1/s], shape (m,): above the real axis. `amplitude`, shape (m,): at the window's first sample."""
 
     pole: ComplexArray
     amplitude: FloatArray
@@ -36,10 +28,7 @@ class Exponentials(NamedTuple):
 class Subspace:
     """The signal subspace of a window; orders are cut out of it.
 
-    Parameters
-    ----------
-    signal : array, shape (n,)
-        Real, or complex where it is a band that was moved to zero.
+    `signal`, shape (n,): real, or complex where it is a band that was moved to zero
     """
 
     def __init__(self, signal: FloatArray | ComplexArray, most: int) -> None:
@@ -54,14 +43,7 @@ class Subspace:
         self.vectors = vectors[:, ::-1][:, : int(np.sum(known))]
 
     def exponentials(self, order: int, rate: float) -> Exponentials:
-        """Return the exponentials of an order.
-
-        Parameters
-        ----------
-        order : int
-            Dimension of the subspace: two for each real exponential.
-        rate : float [Hz]
-        """
+        """Return the exponentials of an order. `order`: dimension of the subspace: two for each real exponential. `rate` [Hz]."""
         space = self.vectors[:, :order]
         if space.shape[1] < 1:
             return Exponentials(np.zeros(0, dtype=complex), np.zeros(0))
@@ -97,12 +79,8 @@ def _powers(base: ComplexArray, count: int) -> ComplexArray:
 def zoomed(samples: FloatArray, rate: float, centre: float, band: float) -> tuple[ComplexArray, float]:
     """Return a band of a signal, moved to zero, and its own rate [Hz].
 
-    Parameters
-    ----------
-    samples : array, shape (n,)
-    rate : float [Hz]
-    centre, band : float [Hz]
-        Middle and width.
+    `samples`, shape (n,); `rate` [Hz]
+    `centre`, `band` [Hz]: middle and width
     """
     step = max(int(rate / (1.5 * band)), 1)
     taps = scipy.signal.firwin(6 * step + 1, 0.5 * band, fs=rate)
@@ -113,12 +91,8 @@ def zoomed(samples: FloatArray, rate: float, centre: float, band: float) -> tupl
 def peaks(samples: FloatArray, rate: float, lowest: float, highest: float, apart: float, most: int) -> list[float]:
     """Return the frequencies of a long ring's strongest spectral peaks [Hz].
 
-    Parameters
-    ----------
-    samples : array, shape (n,)
-    rate, lowest, highest, apart : float [Hz]
-        No two are closer than `apart`.
-    most : int
+    `samples`, shape (n,)
+    `rate`, `lowest`, `highest`, `apart` [Hz]: no two are closer than `apart`
     """
     size = np.abs(np.fft.rfft(samples * np.hanning(2 * samples.size)[samples.size :]))
     frequency = np.fft.rfftfreq(samples.size, 1.0 / rate)

@@ -24,10 +24,7 @@ _VISIBLE, _MOST_GAIN = 6.0, 4.0
 class LineGains:
     """What lines are worth in the windows of a record, computed once for each length of the windows.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
+    `samples`, shape (n, c); `rate` [Hz]
     """
 
     def __init__(self, samples: FloatArray, rate: float) -> None:
@@ -37,17 +34,9 @@ class LineGains:
     def of(self, length: int) -> tuple[FloatArray, FloatArray]:
         """Return what a line in each bin is worth in the channel where it stands out most, and the power in it of all channels.
 
-        Parameters
-        ----------
-        length : int
-            Samples of a window, at most n; windows overlap by half, and their spectra are padded to `PADDED` times as many samples.
-
-        Returns
-        -------
-        gain : array, shape (w, b)
-            Logarithms, of bins from 0 to half the rate.
-        power : array, shape (b,)
-            Sum over windows and channels.
+        `length`: samples of a window, at most n; windows overlap by half, and their spectra are padded to `PADDED` times as many samples
+        Returns `gain`, array, shape (w, b): logarithms, of bins from 0 to half the rate.
+        Returns `power`, array, shape (b,): sum over windows and channels.
         """
         if length not in self._found:
             window, rows, total = hann(length), [], np.zeros(PADDED * length // 2 + 1)

@@ -22,18 +22,11 @@ _SURE = 3.0
 class OrderLines:
     """Lines at the multiples of the spindle's angle, fitted in windows that follow each other.
 
-    Parameters
-    ----------
-    power : array, shape (m + 1,)
-        Mean square of the line of each order, all channels together; 0 where windows do not share its phase.
-    explained : float
-        Share of the variance about the windows' means that the fits explain, both per degree of freedom.
-    energy : float
-        Mean square about the means, all channels together.
-    amplitude : complex array, shape (w, m + 1, c)
-        Re sum_m amplitude[w, m] e^{i m angle} is what is fitted in each window.
-    length : int
-        Samples of a window.
+    `power`, shape (m + 1,): mean square of the line of each order, all channels together; 0 where windows do not share its phase
+    `explained`: share of the variance about the windows' means that the fits explain, both per degree of freedom
+    `energy`: mean square about the means, all channels together
+    `amplitude`, shape (w, m + 1, c): Re sum_m amplitude[w, m] e^{i m angle} is what is fitted in each window
+    `length`: samples of a window
     """
 
     power: FloatArray
@@ -45,10 +38,7 @@ class OrderLines:
     def rest(self, samples: FloatArray, angle: FloatArray) -> FloatArray:
         """Return what the fits leave of the samples that they were fitted to, shape (w length, c).
 
-        Parameters
-        ----------
-        samples : array, shape (n, c)
-        angle : array, shape (n,) [rad]
+        `samples`, shape (n, c); `angle` [rad], shape (n,)
         """
         return _centred(samples, self.length) - angle_signal(self.amplitude, turned(angle), self.length)
 
@@ -58,14 +48,9 @@ def order_lines(samples: FloatArray, angle: FloatArray, length: int, highest: in
 
     Orders above half the sampling rate are fitted where they stand folded back: the angle at the samples is all that is asked.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    angle : array, shape (n,) [rad]
-    length : int
-        Samples of a window; at most n.
-    highest : int
-        Highest order.
+    `samples`, shape (n, c); `angle` [rad], shape (n,)
+    `length`: samples of a window; at most n
+    `highest`: highest order
     """
     n = samples.shape[0]
     starts = np.arange(0, n - length + 1, length)

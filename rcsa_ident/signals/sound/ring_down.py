@@ -74,16 +74,10 @@ _GAIN = 0.25
 class RingingMode:
     """Something that rings down after a hit.
 
-    Parameters
-    ----------
-    omega, omega_std : float [rad/s]
-        Modulus of the pole: the undamped natural frequency.
-    damping, damping_std : float [-]
-        Damping ratio.
-    level : float [-]
-        Amplitude where the hit has ended, over that of the loudest mode; the median of the hits.
-    hits : int
-        In how many hits it was heard.
+    `omega`, `omega_std` [rad/s]: modulus of the pole: the undamped natural frequency
+    `damping`, `damping_std` [-]: damping ratio
+    `level` [-]: amplitude where the hit has ended, over that of the loudest mode; the median of the hits
+    `hits`: in how many hits it was heard
     """
 
     omega: float
@@ -102,18 +96,11 @@ class RingingMode:
 class RingDown:
     """What recordings of hits tell together.
 
-    Parameters
-    ----------
-    modes : tuple of RingingMode
-        In ascending order of frequency.
-    hits : int
-        That were used, at most 12.
-    steady : tuple of float [rad/s]
-        Tones that do not decay: hum, fans, whistles.
-    damping_doubt : str
-        Why the damping is not to be trusted; empty where it is.
-    highest : float [rad/s]
-        Up to which the recordings hear.
+    `modes`: in ascending order of frequency
+    `hits`: that were used, at most 12
+    `steady`: tuple of float [rad/s], tones that do not decay: hum, fans, whistles
+    `damping_doubt`: why the damping is not to be trusted; empty where it is
+    `highest` [rad/s]: up to which the recordings hear
     """
 
     modes: tuple[RingingMode, ...]
@@ -139,17 +126,9 @@ class _Ring:
 def ring_down(recordings: Sequence[tuple[float, FloatArray]], lossy: bool = False) -> RingDown:
     """Return what rings after the hits in some recordings of one thing.
 
-    Parameters
-    ----------
-    recordings : sequence of (rate [Hz], samples)
-        Sound, or any motion; each with one hit or several.
-    lossy : bool
-        They were compressed with loss: frequencies stay, decays do not.
-
-    Raises
-    ------
-    InputError
-        There is no hit, nothing rings after it, or the recordings are silent.
+    `recordings`: sequence of (rate [Hz], samples); sound, or any motion; each with one hit or several
+    `lossy`: they were compressed with loss: frequencies stay, decays do not
+    Raises `InputError`: there is no hit, nothing rings after it, or the recordings are silent.
 
     Examples
     --------

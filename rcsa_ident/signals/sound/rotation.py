@@ -35,17 +35,11 @@ _DENSITIES = 10.0 ** np.arange(-4.0, 5.0)
 class Rotation:
     """The spindle's angle over a record.
 
-    Parameters
-    ----------
-    rate : float [Hz]
-    angle : array, shape (n,) [rad]
-        At each sample, from the first one.
-    time : array, shape (b,) [s]
-        Middles of the blocks that told it.
-    information : array, shape (b,) [1/rad^2]
-        What each told of it.
-    evidence : float
-        By how much the record is likelier (logarithm) under a speed that changes than under one that does not.
+    `rate` [Hz]
+    `angle` [rad], shape (n,): at each sample, from the first one
+    `time` [s], shape (b,): middles of the blocks that told it
+    `information` [1/rad^2], shape (b,): what each told of it
+    `evidence`: by how much the record is likelier (logarithm) under a speed that changes than under one that does not
     """
 
     rate: float
@@ -68,10 +62,7 @@ class Rotation:
     def about(self, speed: float) -> tuple[float, FloatArray]:
         """Return the speed of the line that fits the angle best [rad/s], and what the angle deviates from it, shape (n,) [rad].
 
-        Parameters
-        ----------
-        speed : float [rad/s]
-            About the speed.
+        `speed` [rad/s]: about the speed
         """
         at = np.arange(self.angle.size) - 0.5 * (self.angle.size - 1)
         off = self.angle - speed / self.rate * (at - at[0])
@@ -96,14 +87,9 @@ class Rotation:
 class Pace:
     """How a speed is followed window by window.
 
-    Parameters
-    ----------
-    window : float [s]
-        Length of the windows, which hold a few revolutions at least.
-    change : float [-]
-        Standard deviation of the change of speed from one to the next, as a share.
-    step : float [-]
-        Between trial speeds, as a share.
+    `window` [s]: length of the windows, which hold a few revolutions at least
+    `change` [-]: standard deviation of the change of speed from one to the next, as a share
+    `step` [-]: between trial speeds, as a share
     """
 
     window: float = WINDOW
@@ -129,19 +115,10 @@ def speed_path(heard: LineGains, lowest: float, highest: float, pace: Pace = WAN
 
     In each window a trial frequency is worth what lines at its multiples are worth; from one window to the next it changes little.
 
-    Parameters
-    ----------
-    heard : LineGains
-        Of the record.
-    lowest, highest : float [Hz]
-        Where it is looked for.
-    pace : Pace
-
-    Returns
-    -------
-    middles : array, shape (w,)
-        Samples from the first one to the windows' middles.
-    frequency : array, shape (w,) [Hz]
+    `heard`: of the record
+    `lowest`, `highest` [Hz]: where it is looked for
+    Returns `middles`, array, shape (w,): samples from the first one to the windows' middles.
+    Returns `frequency`, array, shape (w,) [Hz].
     """
     length = pace.length(heard.rate, lowest, heard.samples.shape[0])
     trial = np.exp(np.arange(np.log(lowest), np.log(highest) + pace.step, pace.step))
@@ -156,16 +133,10 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
     In each block of a few revolutions the lines' phases tell the angle; how fast it may change is what makes them most likely.
     Orders above half the rate do not take part.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    middles : array, shape (w,)
-        Samples from the first one to the middles of the windows in which the speed is known.
-    frequency : array, shape (w,) [Hz]
-        The spindle's in each, to within a few hundredths of a turn over the window.
-    teeth : int
-        Where the speed changes on purpose: of the cutter whose orders do not take part, since then they carry the structure's phase; 1
+    `samples`, shape (n, c); `rate` [Hz]
+    `middles`, shape (w,): samples from the first one to the middles of the windows in which the speed is known
+    `frequency` [Hz], shape (w,): the spindle's in each, to within a few hundredths of a turn over the window
+    `teeth`: where the speed changes on purpose: of the cutter whose orders do not take part, since then they carry the structure's phase; 1
         where all do. 0 where the speed only wanders.
     """
     angle, mean, highest = _expected(samples.shape[0], rate, middles, frequency)
@@ -181,13 +152,9 @@ def follow_on(samples: FloatArray, rotation: Rotation, highest: int) -> Rotation
 
     Their phases turn faster than those of the orders below, and show errors of the angle that these do not.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rotation : Rotation
-        As the orders below half the rate tell it.
-    highest : int
-        Highest order.
+    `samples`, shape (n, c)
+    `rotation`: as the orders below half the rate tell it
+    `highest`: highest order
     """
     centred = np.ascontiguousarray(samples - samples.mean(axis=0))
     told = _told(centred, rotation.rate, rotation.angle, to_hz(rotation.spindle_speed), highest, 0)
@@ -197,12 +164,8 @@ def follow_on(samples: FloatArray, rotation: Rotation, highest: int) -> Rotation
 def follow_changes(samples: FloatArray, rate: float, frequency: float) -> Rotation | None:
     """Return the spindle's angle at each sample, as `follow` tells it about one speed; None where the record does not say that it changes.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    frequency : float [Hz]
-        The spindle's, to within a few hundredths of a turn over the record.
+    `samples`, shape (n, c); `rate` [Hz]
+    `frequency` [Hz]: the spindle's, to within a few hundredths of a turn over the record
     """
     angle, mean, highest = _expected(samples.shape[0], rate, np.zeros(1), np.array([frequency]))
     told = _told(np.ascontiguousarray(samples - samples.mean(axis=0)), rate, angle, mean, highest, 0)

@@ -55,16 +55,10 @@ def multiples(teeth: int | None) -> list[Fraction]:
 def log_odds(samples: FloatArray, rate: float, angle: FloatArray, factors: Sequence[Fraction], teeth: int | None) -> FloatArray:
     """Return the logarithm of each candidate's likelihood beside that of noise alone, shape (f,).
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    angle : array, shape (n,) [rad]
-        Of what turns at the found frequency.
-    factors : sequence of Fraction
-        Frequency of each candidate over the found one.
-    teeth : int or None
-        As told.
+    `samples`, shape (n, c); `rate` [Hz]
+    `angle` [rad], shape (n,): of what turns at the found frequency
+    `factors`: frequency of each candidate over the found one
+    `teeth`: as told
     """
     power, floor, step, windows = _order_spectrum(samples, rate, angle, float(min(factors)))
     nyquist = np.pi * (angle.size - 1) / (angle[-1] - angle[0])

@@ -56,11 +56,8 @@ _COMPARED = 1 << 17
 class FoundSpeed:
     """A speed and how it was found.
 
-    Parameters
-    ----------
-    rotation : Rotation
-    odds : tuple of (float [Hz], float)
-        Frequencies that may be the spindle's and their probabilities, the likeliest first; those of the least probability left out.
+    `odds`: tuple of (float [Hz], float); frequencies that may be the spindle's and their probabilities, the likeliest first; those of the
+        least probability left out
     """
 
     rotation: Rotation
@@ -93,14 +90,9 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
     lines. Those that explain as much as the best one belong together; of these the highest of which all lines are multiples is the
     spindle's, or differs from it by a whole factor: which one, `log_odds` says.
 
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-        Of a cut, or of a spindle that idles.
-    rate : float [Hz]
-    lowest, highest : float [Hz]
-    teeth : int or None
-        As told.
+    `samples`, shape (n, c): of a cut, or of a spindle that idles
+    `rate` [Hz]; `lowest`, `highest` [Hz]
+    `teeth`: as told
     """
     spare = max(samples.shape[0] - _COMPARED, 0) // 2
     middle = LineGains(samples[spare : samples.shape[0] - spare], rate)
@@ -221,13 +213,7 @@ def _ramp(heard: LineGains, lowest: float, highest: float) -> _Fit | None:
 
 
 def rotation_near(samples: FloatArray, rate: float, frequency: float) -> Rotation:
-    """Return how a spindle turns that turns at about this frequency.
-
-    Parameters
-    ----------
-    samples : array, shape (n, c)
-    rate, frequency : float [Hz]
-    """
+    """Return how a spindle turns that turns at about this frequency. `samples`, shape (n, c). `rate`, `frequency` [Hz]."""
     return _fitted(LineGains(samples, rate), frequency).rotation
 
 

@@ -22,13 +22,9 @@ _CENTRES = 100
 class WeightedDraws:
     """Draws of unknowns whose prior is standard normal, with weights.
 
-    Parameters
-    ----------
-    z : array, shape (n, d)
-    weight : array, shape (n,)
-        Sum 1.
-    log_evidence : float
-        Logarithm of the mean likelihood under the prior.
+    `z`, shape (n, d)
+    `weight`, shape (n,): sum 1
+    `log_evidence`: logarithm of the mean likelihood under the prior
     """
 
     z: FloatArray
@@ -51,15 +47,10 @@ def adaptive_importance(
     fewer draws, but where a round was drawn hangs on the draws before it, which then count for too little: in eight dimensions a third of
     the evidence was missing.
 
-    Parameters
-    ----------
-    log_likelihood : callable
-        Of z, shape (n, d), returns shape (n,); it may be an unbiased estimate of the likelihood. It is asked once for each round.
-    first : array, shape (n, d)
-        Draws of the prior, independent standard normals.
-    rng : numpy.random.Generator
-    further, rounds : int
-        Draws of each further round, and how many of these there are.
+    `log_likelihood`: of z, shape (n, d), returns shape (n,); it may be an unbiased estimate of the likelihood. It is asked once for each
+        round.
+    `first`, shape (n, d): draws of the prior, independent standard normals
+    `further`, `rounds`: draws of each further round, and how many of these there are
     """
     parts = [first]
     logs = [log_likelihood(first)]

@@ -20,16 +20,10 @@ class LabelNoise:
     and a share e of labels that are wrong however far the cut is from the limit. A cut far inside tells next to nothing, one that was
     called the opposite of what it must be costs log(1 / e) and no more.
 
-    Parameters
-    ----------
-    width : float [-]
-        w, standard deviation of the logarithm of the limit from one cut to another: stock, wear, the eye of whoever judged.
-    wrong : float [-]
-        e, above 0 and below one half: nothing outweighs the logarithm of 0.
-    marginal : float [-]
-        A cut is called marginal where the logarithm of its depth is that near to the limit's.
-    frequency : float [-]
-        Standard deviation of the logarithm of a measured chatter frequency, the model's own error included.
+    `width` [-]: w, standard deviation of the logarithm of the limit from one cut to another: stock, wear, the eye of whoever judged
+    `wrong` [-]: e, above 0 and below one half: nothing outweighs the logarithm of 0
+    `marginal` [-]: a cut is called marginal where the logarithm of its depth is that near to the limit's
+    `frequency` [-]: standard deviation of the logarithm of a measured chatter frequency, the model's own error included
     """
 
     width: float = 0.3
@@ -55,11 +49,8 @@ class LabelNoise:
     def log_likelihood(self, cuts: TestedCuts, log_limit: FloatArray) -> FloatArray:
         """Return the log probability of all labels together, shape (...).
 
-        Parameters
-        ----------
-        cuts : TestedCuts, n of them
-        log_limit : array, shape (..., n)
-            Logarithm of the limit [m] at each cut.
+        `cuts`: TestedCuts, n of them
+        `log_limit`, shape (..., n): logarithm of the limit [m] at each cut
         """
         margin = log_limit - np.log(cuts.axial_depth)
         probability = {Verdict.STABLE: self.stable, Verdict.CHATTER: lambda m: self.stable(-m), Verdict.MARGINAL: self._marginal}
@@ -72,11 +63,8 @@ class LabelNoise:
     def heard(self, cuts: TestedCuts, chatter: FloatArray) -> FloatArray:
         """Return the log density of the measured chatter frequencies over that of any other line of a spectrum, shape (...).
 
-        Parameters
-        ----------
-        cuts : TestedCuts, n of them
-        chatter : array, shape (..., n) [rad/s]
-            Frequency of each cut's chatter at the limit; NaN where none is expected.
+        `cuts`: TestedCuts, n of them
+        `chatter` [rad/s], shape (..., n): frequency of each cut's chatter at the limit; NaN where none is expected
         """
         known = np.isfinite(cuts.chatter_frequency)
         measured, expected = cuts.chatter_frequency[known], chatter[..., known]

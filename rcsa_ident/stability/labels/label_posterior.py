@@ -50,18 +50,11 @@ class Effort:
 class LabelPosterior:
     """Draws that stand for what is believed after the labels, each as probable as the other.
 
-    Parameters
-    ----------
-    z : array, shape (r, size)
-        Numbers of the uncertain tip.
-    speeds : array, shape (n,) [rad/s]
-        Tested ones, rising; none before the first label.
-    error : array, shape (r, n)
-        Of the logarithm of the limit, at these speeds.
-    log_evidence : float
-        Logarithm of the probability of all labels before they were seen.
-    effective : float
-        Draws with equal weights that would tell as much as the weighted ones that these were chosen from.
+    `z`, shape (r, size): numbers of the uncertain tip
+    `speeds` [rad/s], shape (n,): tested ones, rising; none before the first label
+    `error`, shape (r, n): of the logarithm of the limit, at these speeds
+    `log_evidence`: logarithm of the probability of all labels before they were seen
+    `effective`: draws with equal weights that would tell as much as the weighted ones that these were chosen from
     """
 
     z: FloatArray
@@ -182,13 +175,8 @@ def elliptical_slices(
 ) -> FloatArray:
     """Return standard normal numbers after moves that leave their posterior as it is, every row by itself [murray2010].
 
-    Parameters
-    ----------
-    number : array, shape (r, n)
-    log_likelihood : callable
-        Of such an array, returns shape (r,).
-    rng : numpy.random.Generator
-    moves : int
+    `number`, shape (r, n)
+    `log_likelihood`: of such an array, returns shape (r,)
     """
     here, value = number.copy(), log_likelihood(number)
     for _ in range(moves):

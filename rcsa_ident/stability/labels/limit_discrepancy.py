@@ -20,12 +20,8 @@ class LimitDiscrepancy:
 
     cov(d(Omega), d(Omega')) = s^2 exp(-log(Omega / Omega')^2 / (2 l^2)): ratios of speeds, because lobes repeat by them.
 
-    Parameters
-    ----------
-    deviation : float [-]
-        s, standard deviation; 0.2 stands for limits that are 20 % off.
-    length : float [-]
-        l, ratio of speeds over which errors are alike, as a logarithm.
+    `deviation` [-]: s, standard deviation; 0.2 stands for limits that are 20 % off
+    `length` [-]: l, ratio of speeds over which errors are alike, as a logarithm
 
     Examples
     --------
@@ -53,13 +49,8 @@ class LimitDiscrepancy:
     def given(self, speeds: FloatArray, values: FloatArray, at: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return a draw at other speeds for each row of errors that are known, shape (d, n) -> (d, m).
 
-        Parameters
-        ----------
-        speeds : array, shape (n,) [rad/s]
-        values : array, shape (d, n) [-]
-        at : array, shape (m,) [rad/s]
-            Where one of them is a known speed, what is known there comes back.
-        rng : numpy.random.Generator
+        `speeds` [rad/s], shape (n,); `values` [-], shape (d, n)
+        `at` [rad/s], shape (m,): where one of them is a known speed, what is known there comes back
         """
         if speeds.size == 0:
             return rng.standard_normal((len(values), at.size)) @ self.root(at).T

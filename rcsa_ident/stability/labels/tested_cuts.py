@@ -25,13 +25,9 @@ class Verdict(StrEnum):
 class TestedCuts:
     """Cuts with their verdicts.
 
-    Parameters
-    ----------
-    spindle_speed : array, shape (n,) [rad/s]
-    axial_depth : array, shape (n,) [m]
-    verdict : tuple of Verdict, length n
-    chatter_frequency : array, shape (n,) [rad/s], default all NaN
-        Where it was measured; NaN elsewhere.
+    `spindle_speed` [rad/s], shape (n,); `axial_depth` [m], shape (n,)
+    `verdict`: tuple of Verdict, length n
+    `chatter_frequency`: array, shape (n,) [rad/s], default all NaN; where it was measured; NaN elsewhere
     """
 
     __test__ = False  # a noun, though pytest looks for such names
@@ -107,16 +103,10 @@ class TestedCuts:
 class Tally:
     """How many cuts the limit tells right: predicted by observed.
 
-    Parameters
-    ----------
-    stable_stable, chatter_chatter : int
-        Told right; the first word is the prediction, the second what was seen.
-    stable_chatter : int
-        Chatter that nobody expected.
-    chatter_stable : int
-        Stable cuts that were not expected.
-    stable_marginal, chatter_marginal : int
-        Marginal cuts are told apart and belong to neither.
+    `stable_stable`, `chatter_chatter`: told right; the first word is the prediction, the second what was seen
+    `stable_chatter`: chatter that nobody expected
+    `chatter_stable`: stable cuts that were not expected
+    `stable_marginal`, `chatter_marginal`: marginal cuts are told apart and belong to neither
     """
 
     stable_stable: int
@@ -140,10 +130,8 @@ class Tally:
 def tally(cuts: TestedCuts, limit_depth: FloatArray) -> Tally:
     """Return how many cuts lie on the side of the limit where they were seen.
 
-    Parameters
-    ----------
-    limit_depth : array, shape (n,) [m]
-        The first loss of stability at each cut's own speed; a cut at the limit or below it is predicted to be stable.
+    `limit_depth` [m], shape (n,): the first loss of stability at each cut's own speed; a cut at the limit or below it is predicted to be
+        stable
     """
     limit = np.asarray(limit_depth, dtype=float)
     if limit.shape != cuts.axial_depth.shape or np.any(np.isnan(limit)):

@@ -33,17 +33,11 @@ class UncertainTip:
     A quantity of mean m is m e^{r z - |r|^2 / 2} with a row r of a root and independent standard normals z: its mean is m again. First
     among the numbers z are q of the modes, then two of the coefficients, then one of the softening where there is one.
 
-    Parameters
-    ----------
-    modes : TipModes, m of them
-        Of the means.
-    root : array, shape (3 m, q) [-]
-        Of natural frequencies, damping ratios and stiffnesses of all modes.
-    coefficients : array, shape (2, 2) [-]
-        Of K_tc and K_rc.
-    softening : float [s/rad]
-        Standard deviation of the share of all stiffnesses that a rad/s of spindle speed takes away or adds: modes were measured at
-        standstill. 0 leaves it out.
+    `modes`: TipModes, m of them; of the means
+    `root` [-], shape (3 m, q): of natural frequencies, damping ratios and stiffnesses of all modes
+    `coefficients` [-], shape (2, 2): of K_tc and K_rc
+    `softening` [s/rad]: standard deviation of the share of all stiffnesses that a rad/s of spindle speed takes away or adds: modes were
+        measured at standstill. 0 leaves it out.
     """
 
     modes: TipModes
@@ -71,14 +65,10 @@ class UncertainTip:
     ) -> UncertainTip:
         """Return a tip whose quantities know nothing of each other.
 
-        Parameters
-        ----------
-        modes : TipModes, m of them
-        spreads : array, shape (3, m) [-]
-            Standard deviations of frequencies, damping ratios and stiffnesses over their means.
-        coefficients : (float, float) [-]
-            The same of K_tc and K_rc.
-        softening : float [s/rad]
+        `modes`: TipModes, m of them
+        `spreads` [-], shape (3, m): standard deviations of frequencies, damping ratios and stiffnesses over their means
+        `coefficients`: (float, float) [-]; the same of K_tc and K_rc
+        `softening` [s/rad]
         """
         logarithmic = np.sqrt(np.log1p(np.square(spreads))).ravel()
         known = logarithmic > 0.0
@@ -91,10 +81,7 @@ class UncertainTip:
         Each direction of the spread is a change of the receptance; the changes of frequencies, damping ratios and stiffnesses that come
         nearest to it are found by damped least squares. Directions that change the receptance alike are taken together.
 
-        Raises
-        ------
-        InputError
-            If the spread is no small change.
+        Raises `InputError` if the spread is no small change.
         """
         both = both_directions(tip)
         known = known_modes(both)
@@ -133,14 +120,7 @@ class UncertainTip:
         return found
 
     def at(self, z: FloatArray, speed: float = 0.0) -> TipModes:
-        """Return the modes of one draw at a spindle speed.
-
-        Parameters
-        ----------
-        z : array, shape (size,)
-        speed : float [rad/s]
-            Matters where stiffness changes with it.
-        """
+        """Return the modes of one draw at a spindle speed. `z`, shape (size,). `speed` [rad/s]: matters where stiffness changes with it."""
         frequency, damping, stiffness = self.factors(z)[:-2].reshape(3, -1)
         if self.softening:
             # a share that would leave no stiffness is far outside the spread that anybody states
@@ -196,12 +176,8 @@ def altered(modes: TipModes, frequency: FloatArray, damping: FloatArray, stiffne
 class DrawnLimits:
     """Stability limits of draws of a tip, in the cut that was asked for.
 
-    Parameters
-    ----------
-    log_limit : array, shape (d, n)
-        Logarithm of the limit [m]; that of the largest depth where none was found.
-    chatter : array, shape (d, n) [rad/s]
-        NaN where none was found.
+    `log_limit`, shape (d, n): logarithm of the limit [m]; that of the largest depth where none was found
+    `chatter` [rad/s], shape (d, n): NaN where none was found
     """
 
     log_limit: FloatArray
@@ -212,13 +188,8 @@ class DrawnLimits:
 class TipLimits:
     """The stability limits of an uncertain tip as a function of its numbers z.
 
-    Parameters
-    ----------
-    tip : UncertainTip
-    process : MillingProcess
-        With the means of the coefficients.
-    method : StabilityMethod
-    max_depth : float [m]
+    `process`: with the means of the coefficients
+    `max_depth` [m]
     """
 
     tip: UncertainTip

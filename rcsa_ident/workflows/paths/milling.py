@@ -48,38 +48,24 @@ _NO_WALLS = Walls(0.0, 1.0, np.zeros((2, 0, 0)), np.zeros((2, 0, 0)))
 class PathMilling:
     """What happened along a path, turn by turn in material; axes of the machine, of a robot those of its base.
 
-    Parameters
-    ----------
-    move : array of int, shape (n,)
-        That each turn belongs to.
-    run : array of int, shape (n,)
-        Which turns follow each other without a corner or a rest between, whatever lines of the program they stand in.
-    bend : array, shape (n,) [rad]
-        By which the way has turned since the turn before.
-    time : array, shape (n,) [s]
-    places : array, shape (n, 3) [m]
-        Where the tip was sent.
-    mean_force : array, shape (n, 3) [N]
-        On the tool.
-    peak_force : array, shape (n,) [N]
-        Across the axis.
-    mean_tip : array, shape (n, 3) [m]
-        By which the tip was off.
-    swing : array, shape (n,) [m]
-        From end to end of its way in a turn, across the axis.
-    beside_turns : array, shape (n,) [m]
-        By which the tip stands elsewhere than a turn before, as seen from its mean place in each turn: what is slow beside
-        the tool's turns, as an arm's sway, hardly counts; or than where the tooth before stood as this one does, of teeth that are alike.
-    surface : array, shape (m, 6)
-        Of the walls: place (3) and height above the tip [m], error [m], positive where material is left, and move.
-    roughness : Roughness or None
-        Of the roughest wall that is long enough.
-    lost : bool
-        Whether the tool was ever so far off its path that nothing after it counts.
-    unsettled : float
-        Share of the instants at which force and deflection did not agree, as where a tooth comes in at just that place.
-    left_out : tuple of str
-        What takes out material and is not marched.
+    `move`: array of int, shape (n,); that each turn belongs to
+    `run`: array of int, shape (n,); which turns follow each other without a corner or a rest between, whatever lines of the program they
+        stand in
+    `bend` [rad], shape (n,): by which the way has turned since the turn before
+    `time` [s], shape (n,)
+    `places` [m], shape (n, 3): where the tip was sent
+    `mean_force` [N], shape (n, 3): on the tool
+    `peak_force` [N], shape (n,): across the axis
+    `mean_tip` [m], shape (n, 3): by which the tip was off
+    `swing` [m], shape (n,): from end to end of its way in a turn, across the axis
+    `beside_turns` [m], shape (n,): by which the tip stands elsewhere than a turn before, as seen from its mean place in each turn: what is
+        slow beside the tool's turns, as an arm's sway, hardly counts; or than where the tooth before stood as this one does, of teeth that
+        are alike
+    `surface`, shape (m, 6): of the walls: place (3) and height above the tip [m], error [m], positive where material is left, and move
+    `roughness`: of the roughest wall that is long enough
+    `lost`: whether the tool was ever so far off its path that nothing after it counts
+    `unsettled`: share of the instants at which force and deflection did not agree, as where a tooth comes in at just that place
+    `left_out`: what takes out material and is not marched
     """
 
     move: np.ndarray
@@ -350,18 +336,11 @@ def carriers_of(
 ) -> Callable[[int, PathFrame], Carrier]:
     """Return who carries a tool on the moves of a path, as `toolpath.path_march.mill_along` asks for it.
 
-    Parameters
-    ----------
-    change : ToolChange
-        The tooling.
-    stations : callable
-        The machine of a move; a robot's tip has the base's x and y.
-    speeds : array, shape (k,) [rad/s]
-        Of the spindle on each move.
-    play : bool
-        With the play of a robot's drives.
-    weight : bool
-        Whether the arm's weight holds its play. The sag of the first move counts as known: the workpiece was touched with it.
+    `change`: the tooling
+    `stations`: the machine of a move; a robot's tip has the base's x and y
+    `speeds` [rad/s], shape (k,): of the spindle on each move
+    `play`: with the play of a robot's drives
+    `weight`: whether the arm's weight holds its play. The sag of the first move counts as known: the workpiece was touched with it.
     """
     known: dict[tuple[int, float], Carrier] = {}
 

@@ -38,20 +38,11 @@ Block = tuple[FloatArray, FloatArray]
 class PathRemoval(Shown):
     """What a path has taken out of its stock.
 
-    Parameters
-    ----------
-    path : ToolPath
-        With all places between which moves were made.
-    engagement : PathEngagement
-    arc_volume : array, shape (n,) [m^3]
-        That each arc takes out.
-    part : DexelField
-        What is left.
-    removed : float [m^3]
-    updates : int
-        Lines of material that were met.
-    seconds : float
-    warnings : tuple of str
+    `path`: with all places between which moves were made
+    `arc_volume` [m^3], shape (n,): that each arc takes out
+    `part`: what is left
+    `removed` [m^3]
+    `updates`: lines of material that were met
     """
 
     path: ToolPath
@@ -91,19 +82,10 @@ def solid_of(tooling: Tooling) -> ToolSolid:
 def field_of(tooling: Tooling, block: Block | None = None, surface: Surface | None = None, cell: float | None = None) -> DexelField:
     """Return stock for a tooling: a block, or the inside of a surface.
 
-    Parameters
-    ----------
-    tooling : Tooling
-    block : pair of arrays, shape (3,) [m]
-    surface : Surface
-        Instead of the block.
-    cell : float or None [m]
-        Between lines of material, by default a twentieth of the tool's radius (`default_cell`).
-
-    Raises
-    ------
-    InputError
-        If the lines would not fit into memory, or the surface is not closed.
+    `block`: pair of arrays, shape (3,) [m]
+    `surface`: instead of the block
+    `cell` [m]: between lines of material, by default a twentieth of the tool's radius (`default_cell`)
+    Raises `InputError` if the lines would not fit into memory, or the surface is not closed.
     """
     if (block is None) == (surface is None):
         raise InputError("stock", "none" if block is None else "two", "a block or a surface")

@@ -36,20 +36,11 @@ _TURNED_OVER = 0.2
 class RobotPath:
     """An arm that is sent along a path, and the forces on its tool.
 
-    Parameters
-    ----------
-    robot : FlexibleRobot
-    start : array, shape (6,) [rad]
-        Near the first place's posture.
-    assembly : ToolAssembly
-        The tool-holder and the tool; they bend as they do at rest, clamped to the arm.
-    path : ToolPath
-        Of the tool's tip in the base's axes; its places are those that are corrected.
-    force : ForceAlongPath
-    controller : Controller
-    weight : bool
-        Whether the arm has its weight. Its sag at the path's first place counts as known: the work was touched in there.
-    step : float [s]
+    `start` [rad], shape (6,): near the first place's posture
+    `assembly`: the tool-holder and the tool; they bend as they do at rest, clamped to the arm
+    `path`: of the tool's tip in the base's axes; its places are those that are corrected
+    `weight`: whether the arm has its weight. Its sag at the path's first place counts as known: the work was touched in there.
+    `step` [s]
     """
 
     robot: FlexibleRobot
@@ -219,12 +210,7 @@ class IdealForce:
 
 @dataclass(frozen=True, slots=True)
 class Mirror:
-    """What gives way in a march along the commanded path is taken off it; what the controller leaves of corners is not.
-
-    Parameters
-    ----------
-    passes : int
-    """
+    """What gives way in a march along the commanded path is taken off it; what the controller leaves of corners is not."""
 
     passes: int = 1
 
@@ -241,19 +227,9 @@ class Mirror:
 def compensate(task: RobotPath, method: Method, largest: float = LARGEST, arms: Sequence[FlexibleRobot] = ()) -> CompensatedPath:
     """Return the path to command so that the tool goes where the task's path has it.
 
-    Parameters
-    ----------
-    task : RobotPath
-    method : Method
-    largest : float [m]
-        No place is corrected by more; where that would be, it is told.
-    arms : sequence of FlexibleRobot
-        On which the commanded path is tried, too: draws of what is known of the arm.
-
-    Raises
-    ------
-    InputError
-        If the path itself is out of the arm's reach.
+    `largest` [m]: no place is corrected by more; where that would be, it is told
+    `arms`: on which the commanded path is tried, too: draws of what is known of the arm
+    Raises `InputError` if the path itself is out of the arm's reach.
     """
     positive("largest correction", largest, "m")
     followed = task.followed(task.postures)

@@ -16,12 +16,8 @@ from rcsa_ident.toolpath.compensation import ahead_of_force, mirrored
 def reached(robot: FlexibleRobot, postures: FloatArray, forces: FloatArray) -> FloatArray:
     """Return where the tool point is under forces when the drives hold some postures, shape (k, 3) [m].
 
-    Parameters
-    ----------
-    robot : FlexibleRobot
-    postures : array, shape (k, j) [rad]
-    forces : array, shape (k, 6) [N, N m]
-        At the tool point in the base's axes: forces, then moments.
+    `postures` [rad], shape (k, j)
+    `forces` [N, N m], shape (k, 6): at the tool point in the base's axes: forces, then moments
     """
     model, tilts = robot.model, robot.tilts
     rests = (at_rest(model, q, force, tilts) for q, force in zip(postures, forces, strict=True))
@@ -34,10 +30,7 @@ def ahead_of_forces(robot: FlexibleRobot, postures: FloatArray, forces: FloatArr
     By the springs' answer to the ideal motion's torques (`toolpath.compensation.ahead_of_force`); what tilts is commanded through the
     place that it leads to, which the drives alone reach then.
 
-    Raises
-    ------
-    InputError
-        If no posture of the drives reaches such a place.
+    Raises `InputError` if no posture of the drives reaches such a place.
     """
     model, tilts = robot.model, robot.tilts
     full = np.array([model.chain(tilts).angles(model.posture(q)) for q in postures])

@@ -22,18 +22,11 @@ def arm_carrier(
 ) -> Carrier:
     """Return an arm with a rigid tool as what carries its tip.
 
-    Parameters
-    ----------
-    robot : FlexibleRobot
-    posture : array, shape (j,) [rad]
-    turn : float [rad]
-        Of the feed from the tool's x (`feed_turn`).
-    lever : float [m]
-        From where the tool-holder sits to the tip.
-    play : bool
-        With the drives' backlash.
-    weight : bool
-        With the arm's own weight, less what the control takes out.
+    `posture` [rad], shape (j,)
+    `turn` [rad]: of the feed from the tool's x (`feed_turn`)
+    `lever` [m]: from where the tool-holder sits to the tip
+    `play`: with the drives' backlash
+    `weight`: with the arm's own weight, less what the control takes out
     """
     model = robot.model
     chain = model.chain(robot.tilts)

@@ -58,10 +58,7 @@ def stations_along(machine: TipSource, tooling: Tooling, path: ToolPath) -> Call
 
     A robot's posture is that at the first place of every `EVERY` of the way, its tip's X the base's as far as the tool's axis allows.
 
-    Raises
-    ------
-    InputError
-        If the robot does not reach such a place; it says which.
+    Raises `InputError` if the robot does not reach such a place; it says which.
     """
     ways = path.moves
     if not isinstance(machine, PosedRobot):
@@ -89,31 +86,20 @@ def stations_along(machine: TipSource, tooling: Tooling, path: ToolPath) -> Call
 class CutsAlong:
     """What a tool does on the moves of a path; nan, and nothing told, where it cuts nothing.
 
-    Parameters
-    ----------
-    depth : array, shape (k,) [m]
-        Of material on its edges, along its axis.
-    speed, feed_per_tooth : arrays, shape (k,) [rad/s, m]
-    margin : array, shape (k,)
-        How many times as deep as it is a cut becomes unstable, where it is the same all along the edge; else how many times stronger the
-        material would have to be. Below 1 it chatters; `FARTHEST` says as much or more.
-    of_strength : array of bool, shape (k,)
-        Where the margin is the material's: of cuts that change along the edge.
-    margin_low : array, shape (k,)
-        What 95 % of the drawn machines reach; the margin itself where none are drawn, and of cuts that change along the edge.
-    chatter_frequency : array, shape (k,) [rad/s]
-        At the limit.
-    mean_force : array, shape (k, 3) [N]
-        On the tool along the feed, its normal and the axis towards the spindle.
-    peak_force : array, shape (k,) [N]
-        Across the axis, in a revolution.
-    deflection : array, shape (k,) [m]
-        Of the tip across the axis, the largest in a revolution of a stable cut.
-    form_error : array, shape (k,) [m]
-        Of the wall that is left, mean along the edge; positive where material is left. nan where no wall is, or the cut is unstable.
-    groups : int
-        Different cuts that were computed.
-    warnings : tuple of str
+    `depth` [m], shape (k,): of material on its edges, along its axis
+    `speed`, `feed_per_tooth` [rad/s, m], shape (k,)
+    `margin`, shape (k,): how many times as deep as it is a cut becomes unstable, where it is the same all along the edge; else how many
+        times stronger the material would have to be. Below 1 it chatters; `FARTHEST` says as much or more.
+    `of_strength`: array of bool, shape (k,); where the margin is the material's: of cuts that change along the edge
+    `margin_low`, shape (k,): what 95 % of the drawn machines reach; the margin itself where none are drawn, and of cuts that change along
+        the edge
+    `chatter_frequency` [rad/s], shape (k,): at the limit
+    `mean_force` [N], shape (k, 3): on the tool along the feed, its normal and the axis towards the spindle
+    `peak_force` [N], shape (k,): across the axis, in a revolution
+    `deflection` [m], shape (k,): of the tip across the axis, the largest in a revolution of a stable cut
+    `form_error` [m], shape (k,): of the wall that is left, mean along the edge; positive where material is left. nan where no wall is, or
+        the cut is unstable
+    `groups`: different cuts that were computed
     """
 
     depth: FloatArray
