@@ -39,10 +39,8 @@ def listen(
     json_: Json = False,
 ) -> None:
     """Tell from a recording alone: the spindle's speed, teeth, whether it cuts stably or chatters, and which speeds to try."""
-    from rcsa_ident.io.recordings.open_recording import open_recording
+    from rcsa_ident.front.recorded import listen as ask
     from rcsa_ident.report.summaries import listening_row
-    from rcsa_ident.signals.recording import Quantity
-    from rcsa_ident.workflows.listen import listen_to
 
     if (speeds_from is None) != (speeds_to is None):
         given = "--speeds-from" if speeds_to is None else "--speeds-to"
@@ -52,22 +50,20 @@ def listen(
         if len(recordings) > 1:
             raise InputError("--plot", f"{len(recordings)} recordings", "one recording")
     between = None if speeds_from is None or speeds_to is None else (from_rpm(speeds_from), from_rpm(speeds_to))
-    stages, told = Stages(quiet=json_), None if quantity is None else Quantity(quantity)
+    speed = None if speed_rpm is None else from_rpm(speed_rpm)
+    stages = Stages(quiet=json_)
     answers_: list[dict[str, Any]] = []
     for path in recordings:
         with stages.stage(str(path)):
-            opened = open_recording(path, channel, rate_hz)
             try:
-                measured, channels, assumed = opened.of(told, channel, sensitivity)
-                speed = None if speed_rpm is None else from_rpm(speed_rpm)
-                answer = listen_to(opened.rate, [each.samples for each in channels], measured, teeth, speed, between, path.name)
+                answer = ask(path, channel, quantity, teeth, speed, between, rate_hz, sensitivity)
             except InputError as error:
-                raise error.at(str(path)) from None
+                raise error if error.where else error.at(str(path)) from None
         if plot is not None:
             from rcsa_ident.report.listening import listening_figure
 
             listening_figure(answer).savefig(plot, dpi=150)
-        answers_.append({"recording": str(path)} | listening_row(answer, [each.name for each in channels], assumed))
+        answers_.append({"recording": str(path)} | listening_row(answer))
         if not json_:
             _show(answers_[-1])
     if json_:

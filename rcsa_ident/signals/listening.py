@@ -84,12 +84,15 @@ class Record(NamedTuple):
     quantity : Quantity
     name : str
         Of the recording.
+    channels : tuple of str
+        As the recording names them.
     """
 
     samples: FloatArray
     rate: float
     quantity: Quantity
     name: str = ""
+    channels: tuple[str, ...] = ()
 
     @property
     def loudest(self) -> FloatArray:
