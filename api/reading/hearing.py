@@ -15,6 +15,7 @@ from api.work.toolings import keys_of, parsed, tooling_from, weigh
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm, to_hz
+from rcsa_ident.front.recorded import heard
 from rcsa_ident.io.curves.exports import write_tap
 from rcsa_ident.io.recordings.open_recording import open_recording
 from rcsa_ident.io.recordings.self_describing_tables import OpenRecording
@@ -44,15 +45,13 @@ def listen(path: Path, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
     """
     opened = _opened(path, name, asked["channel"], asked["rate_hz"])
     try:
-        quantity = None if asked["quantity"] is None else Quantity(asked["quantity"])
-        quantity, channels, assumed = opened.of(quantity, asked["channel"], asked["sensitivity"])
         speed = None if asked["speed_rpm"] is None else from_rpm(asked["speed_rpm"])
         between = None if asked["speeds_from"] is None else (from_rpm(asked["speeds_from"]), from_rpm(asked["speeds_to"]))
-        answer = listen_to(opened.rate, [each.samples for each in channels], quantity, asked["teeth"], speed, between, name)
+        told = {"teeth": asked["teeth"], "spindle_speed": speed, "between": between}
+        answer = heard(opened, asked["channel"], asked["quantity"], asked["sensitivity"], name, **told)
     except InputError as error:
         raise with_client_name(error, path, name) from None
-    row = {"recording": name} | listening_row(answer, [each.name for each in channels], assumed)
-    return row | {"curves": _curves(answer) if asked["curves"] else None}
+    return {"recording": name} | listening_row(answer) | {"curves": _curves(answer) if asked["curves"] else None}
 
 
 def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:

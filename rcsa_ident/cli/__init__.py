@@ -25,21 +25,16 @@ from rcsa_ident.cli import (  # noqa: E402
     forces,
     identify,
     learn,
-    listen,
     lobes,
-    machine,
     path,
     path_compensate,
     path_cut,
     plan,
-    ring,
+    recorded,
     robot,
-    robot_draw,
     robot_identify,
-    robot_import,
     robot_plan,
-    schema,
-    tap,
+    set_up,
     tools,
 )
 
@@ -82,9 +77,9 @@ _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
         tools.draw,
     ),
     "Further measurements": (
-        listen.listen,
-        tap.tap,
-        ring.ring,
+        recorded.listen,
+        recorded.tap,
+        recorded.ring,
         calibrate.calibrate,
         calibrate.materials,
         compare.compare,
@@ -92,12 +87,12 @@ _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
         decouple.axial,
         contact.contact,
     ),
-    "Virtual machine and set-up": (machine.simulate, schema.schema, machine.warm),
+    "Virtual machine and set-up": (set_up.simulate, set_up.schema, set_up.warm),
 }
 for _title, _commands in _COMMANDS.items():
     for _command in _commands:
         app.command(_command.__name__.replace("_", "-"), cls=_Literal, rich_help_panel=_title)(_command)
-_OF_ROBOTS = robot.COMMANDS | robot_draw.COMMANDS | robot_import.COMMANDS | robot_identify.COMMANDS | robot_plan.COMMANDS
+_OF_ROBOTS = robot.COMMANDS | robot_identify.COMMANDS | robot_plan.COMMANDS
 for _name, _command in _OF_ROBOTS.items():
     robot.robot_app.command(_name, cls=_Literal)(_command)
 app.add_typer(robot.robot_app, name="robot", rich_help_panel="Milling robots")

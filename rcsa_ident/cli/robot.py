@@ -1,4 +1,4 @@
-"""robot: what an arm does at a posture and along a path, and what a tool on it may cut."""
+"""robot: an arm from its maker's description, what it does at a posture and along a path, its picture, and what a tool on it may cut."""
 
 from __future__ import annotations
 
@@ -193,6 +193,123 @@ def map_(
     say(f"written: {out} ({len(along)} places, {change.speeds.size} speeds, {stages.seconds['limits']:.2f} s)")
 
 
+@answers
+def draw(
+    robot: RobotFile,
+    posture: Posture,
+    out: Annotated[Path, typer.Option(help="ARM.svg to write; one unit is a millimetre of the arm.", show_default=False)],
+    tooling: Annotated[
+        Path | None, typer.Option(help="TOOLING.toml that sits at the tool point, drawn to scale.", show_default=False)
+    ] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option(
+            help="PATH.nc or PATH.csv of the tool's tip: it is drawn, and lightly the arm at its first and last place. "
+            "--posture stands near the first one; needs --tooling.",
+            show_default=False,
+        ),
+    ] = None,
+    azimuth: Annotated[
+        float, typer.Option("--azimuth-deg", help="Where one stands who looks at an angle, from the base's x.", min=-360.0, max=360.0)
+    ] = -58.0,
+    elevation: Annotated[float, typer.Option("--elevation-deg", help="By which one looks down.", min=-90.0, max=90.0)] = 22.0,
+    json_: Json = False,
+) -> None:
+    """Draw an arm at a posture, at an angle and from the side: links, joints with their axes, spindle and tool, a scale in millimetres."""
+    import numpy as np
+
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.settings.setups import read_tooling
+    from rcsa_ident.report.robot_drawing import arm_svg
+
+    writable(out)
+    flexible = arm_of(robot, False)
+    arm, angles = flexible.model, joint_angles(posture, flexible)
+    assembly = None if tooling is None else read_tooling(tooling).assembly
+    places: FloatArray | None = None
+    ends: list[FloatArray] = []
+    if path is not None:
+        from rcsa_ident.io.paths.tool_paths import read_tool_path
+        from rcsa_ident.workflows.robot_postures import following
+
+        if assembly is None:
+            raise InputError("--tooling", "nothing", "TOOLING.toml: the path is that of a tool's tip")
+        along = read_tool_path(path)
+        places = along.places
+        postures = following(arm, angles, along.places, along.axes, assembly)
+        ends = [postures[0], postures[-1]]
+    write_text(out, arm_svg(arm, angles, assembly, places, ends, (azimuth, elevation)))
+    warnings = list(arm.beyond_limits(angles))
+    if json_:
+        told = {"name": arm.name, "posture_deg": np.degrees(angles).tolist(), "ends_deg": [np.degrees(each).tolist() for each in ends]}
+        emit(told | {"warnings": warnings, "out": str(out)})
+        return
+    for warning in warnings:
+        warn(warning)
+    say(f"written: {out}")
+
+
+@answers
+def import_(
+    urdf: Annotated[Path, typer.Argument(help="ARM.urdf; of xacro what it expands to.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="ROBOT.toml to write.", show_default=False)],
+    stiffness: Annotated[
+        str,
+        typer.Option(
+            "--stiffness-nm-per-rad",
+            metavar="'K1 K2 ...'",
+            help="Of each joint from the base on, or one for all; URDF has none.",
+            show_default=False,
+        ),
+    ],
+    damping: Annotated[
+        str | None,
+        typer.Option("--damping-nms-per-rad", metavar="'D1 D2 ...'", help="Likewise; none without it.", show_default=False),
+    ] = None,
+    flange: Annotated[
+        str | None,
+        typer.Option(help="Link whose axes are the flange; by default the last one of an arm without branches.", show_default=False),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Write ROBOT.toml from a URDF file: joints with their limits, and masses with their moments of inertia.
+
+    URDF takes joints for rigid: their stiffness has to be told. That of milling arms with a payload of 130 to 600 kg is 1e6 to 1e7 N m/rad;
+    `robot identify` finds it from records.
+    """
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.settings.robots import robot_keys
+    from rcsa_ident.io.settings.urdf import read_urdf
+    from rcsa_ident.io.toml_text import toml_of
+
+    writable(out)
+    springs = _numbers(stiffness, "--stiffness-nm-per-rad", 1e-300)
+    dampers = [0.0] if damping is None else _numbers(damping, "--damping-nms-per-rad", 0.0)
+    arm, notes = read_urdf(urdf, springs, dampers, flange)
+    warnings = list(notes)
+    if damping is None:
+        warnings.append("no damping is told: without --damping-nms-per-rad the arm's modes ring for ever, lobes mean nothing")
+    write_text(out, toml_of(robot_keys(arm), [f"from {urdf.name}; stiffness as told, the tool point is the flange", *notes]))
+    if json_:
+        told = {"name": arm.name, "joints": [joint.name for joint in arm.joints], "mass_kg": arm.mass if arm.weighed else None}
+        emit(told | {"warnings": warnings, "out": str(out)})
+        return
+    say(f"{arm.name}: {len(arm.joints)} joints ({', '.join(joint.name for joint in arm.joints)}), {arm.mass:.1f} kg")
+    for warning in warnings:
+        warn(warning)
+    say(f"written: {out}")
+
+
+def _numbers(text: str, option: str, least: float) -> list[float]:
+    try:
+        found = [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        found = []
+    if not found or not all(math.isfinite(each) and each >= least for each in found):
+        raise InputError(option, text, f"one number for all joints, or one a joint, {'0 or more' if least == 0.0 else 'above 0'}")
+    return found
+
+
 def arm_of(path: Path, joints_only: bool) -> FlexibleRobot:
     from rcsa_ident.io.settings.robots import read_robot
     from rcsa_ident.machine.robot.flexible import FlexibleRobot
@@ -249,4 +366,4 @@ def joint_angles(text: str, arm: FlexibleRobot) -> FloatArray:
 
 
 #: By their names on the command line.
-COMMANDS: dict[str, Any] = {"check": check, "tip": tip, "lobes": lobes, "map": map_}
+COMMANDS: dict[str, Any] = {"check": check, "tip": tip, "lobes": lobes, "map": map_, "draw": draw, "import": import_}

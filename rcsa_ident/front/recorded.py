@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits  # small matrices: further threads only wait, and add up in another order
 
@@ -17,6 +17,7 @@ from rcsa_ident.setup.tooling import Tooling
 
 if TYPE_CHECKING:
     from rcsa_ident.identification.ring.ringing import RungTooling
+    from rcsa_ident.io.recordings.self_describing_tables import OpenRecording
     from rcsa_ident.signals.listening import Listening
     from rcsa_ident.signals.recording import Quantity
     from rcsa_ident.signals.tap import HitEstimator, TapFrf
@@ -68,16 +69,28 @@ def listen(
     """
     from rcsa_ident.io.recordings.open_recording import open_recording
     from rcsa_ident.signals.recording import Quantity
-    from rcsa_ident.workflows.listen import listen_to
 
-    path, known = Path(recording), [str(each) for each in Quantity]
+    known = [str(each) for each in Quantity]
     if quantity is not None and quantity not in known:
         raise InputError("quantity", quantity, ", ".join(known))
-    opened = open_recording(path, channels, rate)
-    measured, chosen, assumed = opened.of(None if quantity is None else Quantity(quantity), channels, sensitivity)
+    opened = open_recording(recording, channels, rate)
     with threadpool_limits(1):
-        answer = listen_to(opened.rate, [each.samples for each in chosen], measured, teeth, speed, between, path.name)
-    return replace(answer, reasons=(*answer.reasons, *assumed))
+        told = {"teeth": teeth, "spindle_speed": speed, "between": between}
+        return heard(opened, channels, quantity, sensitivity, Path(recording).name, **told)
+
+
+def heard(
+    opened: OpenRecording, channels: Sequence[str], quantity: Quantity | str | None, sensitivity: float | None, name: str, **told: Any
+) -> Listening:
+    """Return what an opened recording says, told what `listen_to` takes; its reasons name what was taken as given."""
+    from rcsa_ident.signals.recording import Quantity
+    from rcsa_ident.workflows.listen import listen_to
+
+    measured, chosen, assumed = opened.of(None if quantity is None else Quantity(quantity), channels, sensitivity)
+    answer = listen_to(opened.rate, [each.samples for each in chosen], measured, **told)
+    assert answer.record is not None
+    record = answer.record._replace(name=name, channels=tuple(each.name for each in chosen))
+    return replace(answer, reasons=(*answer.reasons, *assumed), record=record)
 
 
 def tap(

@@ -389,22 +389,18 @@ def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinat
     return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes, "cross": cross}
 
 
-def listening_row(answer: Listening, channels: Sequence[str], remarks: Sequence[str] = ()) -> dict[str, Any]:
-    """Return what channels of a recording say in the units of the shop floor.
-
-    `answer`: with its record
-    `remarks`: what was taken as given when the recording was opened
-    """
+def listening_row(answer: Listening) -> dict[str, Any]:
+    """Return what a recording says in the units of the shop floor, of an answer with its record."""
     assert answer.record is not None
 
     def rpm(speed: float | None) -> float | None:
         return None if speed is None else to_rpm(speed)
 
     return {
-        "channels": list(channels),
+        "channels": list(answer.record.channels),
         "quantity": str(answer.record.quantity),
         "verdict": str(answer.verdict),
-        "reasons": [*answer.reasons, *remarks],
+        "reasons": list(answer.reasons),
         "spindle_speed_rpm": rpm(answer.spindle_speed),
         "spindle_speed_std_rpm": rpm(answer.spindle_speed_std),
         "other_speeds_rpm": [to_rpm(speed) for speed in answer.other_speeds],

@@ -75,12 +75,14 @@ class Record(NamedTuple):
     `samples`, shape (n, c): lost samples are filled
     `rate` [Hz]
     `name`: of the recording
+    `channels`: as the recording names them
     """
 
     samples: FloatArray
     rate: float
     quantity: Quantity
     name: str = ""
+    channels: tuple[str, ...] = ()
 
     @property
     def loudest(self) -> FloatArray:

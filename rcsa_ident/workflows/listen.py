@@ -27,14 +27,12 @@ def listen_to(
     teeth: int | None = None,
     spindle_speed: float | None = None,
     between: tuple[float, float] | None = None,
-    name: str = "",
 ) -> Listening:
     """Return what channels of one quantity say, lost and saturated samples told, with the samples that were judged.
 
     `rate` [Hz]
     `channels`: sequence of array, shape (n,); lost samples are NaN
     `quantity`, `teeth`, `spindle_speed`, `between`: as of `rcsa_ident.signals.listening.listen`
-    `name`: of the recording
     Raises `InputError`: too many samples are lost, or the record says nothing at all.
 
     Examples
@@ -66,7 +64,7 @@ def listen_to(
         words = f"of {whole.shape[0] / rate:.4g} s those from {spare / rate:.4g} to {(spare + MOST) / rate:.4g} s were listened to"
         answer = replace(answer, reasons=(*answer.reasons, words))
     events = sorted((*answer.events, *events), key=lambda event: event.time or 0.0)
-    return replace(answer, events=tuple(events), record=Record(filled, rate, quantity, name))
+    return replace(answer, events=tuple(events), record=Record(filled, rate, quantity))
 
 
 def _events(found: Sequence[ChannelScan], rate: float) -> list[Event]:

@@ -5,11 +5,11 @@ import json
 import typer
 from typer.testing import CliRunner
 
-from rcsa_ident.cli import schema
+from rcsa_ident.cli import set_up
 from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of
 
 app = typer.Typer()
-app.command("schema")(schema.schema)
+app.command("schema")(set_up.schema)
 
 
 def test_every_schema_is_printed_and_written_alike(tmp_path):

@@ -1,4 +1,4 @@
-"""simulate and warm."""
+"""simulate, schema and warm: the virtual machine and set-up."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, writable
 from rcsa_ident.cli.processes import Processes
 from rcsa_ident.front.processes import workers
 
@@ -31,6 +32,33 @@ def simulate(
         emit({"folder": str(done.folder), "truth": str(done.truth), "cuts": done.cuts, "seconds": seconds})
     else:
         say(f"{done.cuts} cuts in {seconds:.1f} s: {done.folder}, truth in {done.truth}")
+
+
+@answers
+def schema(
+    name: Annotated[
+        str, typer.Argument(metavar="tooling|campaign|machine|modes|cases|robot", help="The kind of file.", show_default=False)
+    ],
+    out: Annotated[Path | None, typer.Option(help="SCHEMA.json to write instead of printing it.", show_default=False)] = None,
+    json_: Json = False,
+) -> None:
+    """Print the JSON Schema of a TOML file: an editor then completes its keys and marks wrong values.
+
+    Name it in the first line of the file: #:schema SCHEMA.json
+    """
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.settings.schemas import SCHEMAS, schema_of, schema_text
+
+    if name not in SCHEMAS:
+        raise InputError("name", name, f"one of {', '.join(SCHEMAS)}")
+    if out is None:
+        say(schema_text(name).rstrip())
+        return
+    write_text(writable(out), schema_text(name))
+    if json_:
+        emit({"out": str(out), "title": schema_of(name)["title"]})
+    else:
+        say(f"written: {out}; first line of a file that it belongs to: #:schema {out.name}")
 
 
 @answers
