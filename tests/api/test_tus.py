@@ -17,7 +17,7 @@ from tusclient.exceptions import TusCommunicationError
 
 from api.client import Client
 from api.files import Part
-from tests.api.in_process import embedded, service
+from tests.api.in_process import embedded, refused, service
 from tests.api.recordings import content, declared
 from tests.fixtures.paths import ROOT
 from tests.fixtures.service import serving
@@ -225,6 +225,19 @@ def test_the_same_content_goes_on_where_it_stands(place):
     assert sent(client, where, raw[1000:], 1000).status_code == 204
 
 
+def test_the_client_goes_on_with_its_own_content_alone(place, client, tmp_path):
+    """A mixture of two files of one length would be neither."""
+    http, path, raw = place
+    id, other = path.split("/")[3], content(tmp_path, 1)
+    (tmp_path / NAME).write_bytes(raw)
+    assert len(other) == len(raw)
+    sent(http, begun(http, path, len(raw), sha256=hashlib.sha256(other).hexdigest()), other[:1000], 0)
+    assert client.upload_in_parts(id, tmp_path / NAME, part=50_000).sha256 == hashlib.sha256(raw).hexdigest()
+    (tmp_path / NAME).write_bytes(other)
+    assert "?replace=true" in refused(409, client.upload_in_parts, id, tmp_path / NAME).errors[0].allowed
+    assert client.upload_in_parts(id, tmp_path / NAME, replace=True).sha256 == hashlib.sha256(other).hexdigest()
+
+
 @pytest.mark.slow
 def test_a_file_that_is_not_the_announced_one_is_refused_at_its_end(place):
     client, path, raw = place
@@ -300,7 +313,7 @@ DYING = """
 import os, signal, sys
 from pathlib import Path
 from api.reading.uploads import Uploads
-from tests.api.in_process import embedded, service
+from tests.api.in_process import embedded, refused, service
 from tests.api.test_tus import sent
 
 folder, where, offset, when = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), sys.argv[4]
