@@ -73,21 +73,7 @@ def test_parts_become_the_recording(place):
     assert (last.status_code, last.headers["upload-offset"]) == (204, str(len(raw)))
     recording = client.get(f"{path.removesuffix('uploads')}recordings/{NAME}").json()
     assert recording["sha256"] == hashlib.sha256(raw).hexdigest()
-    # and both faces tell the same of it
-    for face in ("uploads", "recordings"):
-        assert client.head(f"{path.removesuffix('uploads')}{face}/{NAME}", headers=SAYS).headers["upload-offset"] == str(len(raw))
-
-
-def test_both_faces_write_the_same_upload(place):
-    client, path, raw = place
-    where = begun(client, path, len(raw))
-    assert sent(client, where, raw[:1000], 0).status_code == 204
-    answer = client.patch(
-        f"{path.removesuffix('uploads')}recordings/{NAME}",
-        content=raw[1000:],
-        headers={"Upload-Offset": "1000", "Content-Type": "application/octet-stream"},
-    )
-    assert answer.status_code == 201
+    assert client.head(where, headers=SAYS).headers["upload-offset"] == str(len(raw))
 
 
 def test_a_part_with_another_checksum_is_not_kept(place):
@@ -111,10 +97,13 @@ def test_what_breaks_the_protocol_is_refused(place):
     where = begun(client, path, len(raw))
     version = client.head(where)
     assert (version.status_code, version.headers["tus-version"]) == (412, "1.0.0")
-    wrong = sent(client, where, raw[:10], 5)
-    assert (wrong.status_code, wrong.headers["upload-offset"], wrong.headers["tus-resumable"]) == (409, "0", "1.0.0")
+    assert sent(client, where, raw[:1000], 0).status_code == 204
+    for offset in (0, 999, 1001, len(raw)):
+        wrong = sent(client, where, raw[offset : offset + 10], offset)
+        assert (wrong.status_code, wrong.headers["upload-offset"], wrong.headers["tus-resumable"]) == (409, "1000", "1.0.0")
     assert client.patch(where, content=raw[:10], headers=SAYS | {"Upload-Offset": "0", "Content-Type": "text/plain"}).status_code == 415
-    assert sent(client, where, raw + b"more", 0).status_code == 422
+    assert sent(client, where, raw[1000:] + b"x", 1000).status_code == 422
+    assert client.head(where, headers=SAYS).headers["upload-offset"] == "1000"
     assert sent(client, f"{path}/nobody.h5", raw, 0).status_code == 404
     for headers, status in (
         ({"Upload-Metadata": metadata(filename=NAME)}, 422),
@@ -243,10 +232,30 @@ def test_a_file_that_is_not_the_announced_one_is_refused_at_its_end(place):
     client, path, raw = place
     headers = SAYS | {"Upload-Length": str(len(raw)), "Upload-Metadata": metadata(filename=NAME, sha256="ABC")}
     assert client.post(path, headers=headers).status_code == 422
-    where = begun(client, path, len(raw), sha256="0" * 64)
-    answer = sent(client, where, raw, 0)
-    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "Upload-Metadata")
-    assert client.head(where, headers=SAYS).status_code == 404
+    # nor is one that cannot be read
+    for sha256, whole, field in (("0" * 64, raw, "Upload-Metadata"), ("", b"?" * len(raw), "recording")):
+        where = begun(client, path, len(raw), sha256=sha256)
+        answer = sent(client, where, whole, 0)
+        assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, field)
+        assert client.head(where, headers=SAYS).status_code == 404
+    assert [each for each in client.app.state.components.files.folder.rglob("*") if each.is_file()] == []
+
+
+def test_parts_outlive_the_service(store, tmp_path):
+    raw = content(tmp_path)
+    with service(store, tmp_path) as http:
+        client = Client(http=http)
+        path = f"/v1/campaigns/{client.make_campaign(client.make_machine('m').id, declared(2)).id}/uploads"
+        where = begun(http, path, len(raw))
+        assert sent(http, where, raw[:5000], 0).status_code == 204
+    with service(store, tmp_path) as http:
+        assert http.head(where, headers=SAYS).headers["upload-offset"] == "5000"
+        assert sent(http, where, raw[5000:], 5000).status_code == 204
+        # a part that nobody goes on with
+        where = begun(http, path, len(raw), filename="c0_air.h5")
+        assert sent(http, where, raw[:5000], 0).status_code == 204
+        assert http.delete(where.replace("uploads", "recordings")).status_code == 204
+        assert http.head(where, headers=SAYS).status_code == 404
 
 
 def test_an_upload_that_is_being_stored_never_seems_not_to_have_begun(store, tmp_path, monkeypatch):
