@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Sequence
-from typing import Annotated, Any, TypeVar
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, TypeVar
 
-from fastapi import Header, Path, Query, Request
+from fastapi import Header, Path, Query, Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.routing import APIRoute
 
-from api.problems import MEDIA_TYPE, Problem, title
+from api.problems import MEDIA_TYPE, Problem, of_input, of_validation, title
 from api.schemas.common import ID_PATTERN, NAME_PATTERN
 from api.stores.entities import ABSENT, Taken
+from rcsa_ident.base.errors import InputError
 
 Item = TypeVar("Item")
 MachineId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a machine.")]
@@ -68,6 +71,31 @@ def problems(*statuses: int, always: Sequence[int] = _ALWAYS) -> dict[int | str,
 def guard(scope: str, **further: Any) -> dict[str, Any]:
     """Return the OpenAPI extra that names the scope a route requires; `Guarded` reads it."""
     return {"x-scope": scope, **further}
+
+
+class Telling(APIRoute):
+    """Route whose answers all have further headers, problems too."""
+
+    headers: ClassVar[Mapping[str, str]]
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return the handler of a request."""
+        inner = super().get_route_handler()
+
+        async def handler(request: Request) -> Response:
+            try:
+                answer = await inner(request)
+            except (InputError, RequestValidationError, Problem) as error:
+                if isinstance(error, InputError):
+                    problem = of_input(error)
+                else:
+                    problem = error if isinstance(error, Problem) else of_validation(error.errors())
+                problem.headers.update(self.headers)
+                raise problem from None
+            answer.headers.update(self.headers)
+            return answer
+
+        return handler
 
 
 def tagged(digest: str) -> dict[str, str]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 import hashlib
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import httpx2
@@ -82,7 +83,11 @@ class Uploads(Asking):
         with file.open("rb") as opened:
             digest = hashlib.file_digest(opened, "sha256").digest()
             opened.seek(0)
-            headers = {"Content-Type": "application/octet-stream", "Content-Length": str(file.stat().st_size), **_digest(digest)}
+            headers = {
+                "Content-Type": "application/octet-stream",
+                "Content-Length": str(file.stat().st_size),
+                "Repr-Digest": f"sha-256=:{base64.b64encode(digest).decode()}:",
+            }
             params = {"replace": "true"} if replace else {}
             path = _recording(campaign, name or file.name)
             return read(
@@ -97,35 +102,33 @@ class Uploads(Asking):
     ) -> RecordingAnswer:
         """Upload a recording in parts; after a lost connection it continues where the service has received the last byte.
 
+        The key needs the scope `read`, too: tus answers without the description.
+
         Parameters
         ----------
         part : int [bytes]
         attempts : int
             For each part.
         """
-        path, size = _recording(campaign, name or file.name), file.stat().st_size
+        name, size = name or file.name, file.stat().st_size
+        where = f"/campaigns/{campaign}/uploads/{quote(name, safe='')}"
         with file.open("rb") as opened:
-            digest = hashlib.file_digest(opened, "sha256").digest()
+            sha256 = hashlib.file_digest(opened, "sha256").hexdigest()
+            told = {"filename": name, "sha256": sha256} | ({"replace": "true"} if replace else {})
+            metadata = ",".join(f"{key} {base64.b64encode(text.encode()).decode()}" for key, text in told.items())
             failed, offset = 0, -1
             while True:
                 try:
                     if offset < 0:
-                        offset = self._offset(path, size)
-                    if offset == size and (kept := self._kept(path)) is not None:
-                        if kept.sha256 == digest.hex():
+                        if self._is_complete(where) and (kept := self.recording(campaign, name)).sha256 == sha256:
                             return kept
-                        offset = 0
+                        offset = self._begin(where, {"Upload-Length": str(size), "Upload-Metadata": metadata})
                     opened.seek(offset)
-                    data = opened.read(part)
-                    headers = {
-                        "Content-Type": "application/octet-stream",
-                        "Upload-Offset": str(offset),
-                        "Upload-Length": str(size),
-                        **_digest(digest),
-                    }
-                    answer = self.send(
-                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, **self.long_timeout
-                    )
+                    headers = {"Content-Type": "application/offset+octet-stream", "Upload-Offset": str(offset)}
+                    answer = self._tus("PATCH", where, headers, content=opened.read(part), **self.long_timeout)
+                    failed, offset = 0, int(answer.headers["Upload-Offset"])
+                    if offset == size:
+                        return self.recording(campaign, name)
                 except (httpx2.TransportError, ServiceError) as error:
                     failed += 1
                     lost = isinstance(error, httpx2.TransportError) or error.status in (408, 503)
@@ -133,29 +136,32 @@ class Uploads(Asking):
                         raise
                     time.sleep(min(0.2 * 2**failed, 5.0))
                     offset = -1
-                    continue
-                if answer.status_code != 204:
-                    return read(RecordingAnswer, answer)
-                failed, offset = 0, int(answer.headers["Upload-Offset"])
 
-    def _offset(self, path: str, size: int) -> int:
-        """Offset at which an upload continues: 0 where another file is stored, the size where the file is complete."""
+    def _tus(self, method: str, path: str, headers: Mapping[str, str] | None = None, **further: Any) -> httpx2.Response:
+        return self.send(method, path, headers={"Tus-Resumable": "1.0.0", **(headers or {})}, **further)
+
+    def _is_complete(self, where: str) -> bool:
+        """Whether the service lacks no byte of an upload; that of a stored recording is complete."""
         try:
-            state = self.send("HEAD", path).headers
+            state = self._tus("HEAD", where).headers
         except ServiceError as error:
             if error.status != 404:
                 raise
-            return 0
-        offset, length = int(state["Upload-Offset"]), int(state["Upload-Length"])
-        return offset if length == size else 0
+            return False
+        return bool(state["Upload-Offset"] == state["Upload-Length"])
 
-    def _kept(self, path: str) -> RecordingAnswer | None:
+    def _begin(self, where: str, told: Mapping[str, str]) -> int:
+        """Offset at which an upload goes on; one of other content, which has been left unfinished, is given up for it."""
+        begin = partial(self._tus, "POST", where.rpartition("/")[0], told)
         try:
-            return read(RecordingAnswer, self.send("GET", path))
+            answer = begin()
         except ServiceError as error:
-            if error.status != 404:
+            if error.status != 409:
                 raise
-            return None
+            with suppress(ServiceError):
+                self._tus("DELETE", where)
+            answer = begin()
+        return int(answer.headers["Upload-Offset"])
 
     def upload_together(self, campaign: str, files: Iterable[Path], replace: bool = False) -> UploadAnswer:
         """Upload several recordings in one request; the answer has the outcome of each."""
@@ -186,7 +192,3 @@ class Uploads(Asking):
 
 def _recording(campaign: str, name: str) -> str:
     return f"/campaigns/{campaign}/recordings/{quote(name, safe='')}"
-
-
-def _digest(sha256: bytes) -> dict[str, str]:
-    return {"Repr-Digest": f"sha-256=:{base64.b64encode(sha256).decode()}:"}

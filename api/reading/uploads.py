@@ -242,9 +242,13 @@ class Uploads:
         after = replace(recording, found=text, judged_with="" if air is None else air.normalised)
         await asyncio.to_thread(self.store.recordings.judge, recording, after)
 
+    def partial(self, group: str, campaign: str, name: str) -> tuple[Path, Partial | None]:
+        """Return the path of a resumable upload, and its state."""
+        return self.files.partial(group, f"{campaign}/{name}")
+
     def give_up(self, group: str, campaign: str, name: str) -> bool:
         """Remove a resumable upload, also one that is being written, and return whether there was one. The caller holds the lock."""
-        path, state = self.files.partial(group, partial_name(campaign, name))
+        path, state = self.partial(group, campaign, name)
         self.files.forget(path)
         written = (campaign, name) in self.writing
         if written:
@@ -327,11 +331,6 @@ def received(path: Path) -> Received:
 def files_named(recording: Recording) -> list[FileKey]:
     """Return the files that a recording refers to."""
     return [(UPLOADS, recording.sha256), (NORMALISED, recording.normalised)]
-
-
-def partial_name(campaign: str, name: str) -> str:
-    """Return the name of a resumable upload."""
-    return f"{campaign}/{name}"
 
 
 def normalised_key(text: str, name: str, sha256: str) -> str:

@@ -11,13 +11,13 @@ from api.files import Part
 from api.lookups import own_campaign
 from api.problems import Problem, of_input, of_room
 from api.reading.campaign_text import files_of
-from api.routes.recordings import answer, take
+from api.routes.recordings import answer
 from api.schemas.campaigns import ItemProblem, UploadAnswer, UploadItem
 from api.schemas.common import Fault
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
 from api.stores.entities import Damaged, NoRoom
-from api.transfer.body_stream import announced_length, check_room, complete, refuse_encoded, write
+from api.transfer.body_stream import announced_length, check_room, complete, refuse_encoded, take, write
 from api.transfer.multipart import FORM, Head, events
 from api.work.pool import Busy
 from rcsa_ident.base.errors import InputError

@@ -17,12 +17,10 @@ from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import HAMMER, File, files_of
 from api.reading.stored import found_of, samples_of, upload_of
-from api.reading.uploads import Received
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign, Recording
-from api.stores.entities import Taken
 from api.transfer.body_stream import (
     announced_digest,
     announced_length,
@@ -32,7 +30,7 @@ from api.transfer.body_stream import (
     complete,
     new_part,
     refuse_encoded,
-    storage_problems,
+    take,
 )
 from api.transfer.parts_of_file import PartsOfFile
 from rcsa_ident.base.errors import InputError
@@ -81,18 +79,6 @@ async def put(
             response.status_code, kept = await take(components, campaign, name, received, replace)
     response.headers.update(tagged(kept.sha256))
     return answer(campaign, kept)
-
-
-async def take(components: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
-    """Store a received file, or raise a problem with the reason."""
-    try:
-        with storage_problems():
-            return await components.uploads.take(campaign, name, received, replacing)
-    except Taken:
-        fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
-        raise Problem(409, "a recording with other content exists under this name", [fault]) from None
-    except KeyError:
-        raise Problem(404, "there is no such campaign") from None
 
 
 @router.get("", summary="List recordings", openapi_extra=guard("read"), responses=problems(404, 422))

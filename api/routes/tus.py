@@ -1,43 +1,38 @@
-"""Resumable uploads as tus 1.0 speaks of them: another face of `resumable_upload`, for clients that are there already."""
+"""Resumable uploads as tus 1.0 speaks of them."""
 
 from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Callable, Coroutine
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.exceptions import RequestValidationError
 from fastapi.responses import PlainTextResponse
 from starlette.datastructures import Headers
-from starlette.responses import Response as Answer
 from starlette.routing import Match
 from starlette.types import Scope
 
 from api.components import Components, ThisService
-from api.conventions import CampaignId, guard, problems
+from api.conventions import CampaignId, Telling, guard, problems
 from api.files import Partial
 from api.lookups import own_campaign
-from api.problems import Problem, of_input, of_validation
-from api.reading.uploads import partial_name
+from api.problems import Problem
 from api.routes.recordings import RecordingName, named
-from api.routes.resumable_upload import Checksum, Upload, alone, finish, receive, state_of
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
 from api.transfer.body_stream import check_room, storage_problems
+from api.transfer.resumable import Checksum, alone, continued, finish, receive, state_of, writing
 from rcsa_ident.base.errors import InputError
 
 VERSION = "1.0.0"
 EXTENSIONS = "creation,termination,checksum"
 ALGORITHMS = ("sha1", "sha256", "md5")
 PART = "application/offset+octet-stream"
-_SAID = {"Tus-Resumable": VERSION}
 _SHA256 = re.compile("[0-9a-f]{64}")
 _BODY = {"required": True, "content": {PART: {"schema": {"type": "string", "format": "binary"}}}}
 _TUS: dict[str, Any] = {"Tus-Resumable": {"description": "Version of the protocol.", "schema": {"type": "string"}}}
-_OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "Number of bytes received.", "schema": {"type": "string"}}}
+OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "Number of bytes received.", "schema": {"type": "string"}}}
 _PARAMETERS = [
     {"name": "Tus-Resumable", "in": "header", "required": True, "schema": {"const": VERSION}, "description": "Version of the protocol."}
 ]
@@ -58,8 +53,10 @@ Announced = Annotated[
 ]
 
 
-class SpeaksTus(Guarded):
+class SpeaksTus(Telling, Guarded):
     """Routes that name the version of the protocol in every answer, and that go by the method which X-HTTP-Method-Override says."""
+
+    headers: ClassVar = {"Tus-Resumable": VERSION}
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
         """Whether a request is for this route; in front of clients that send POST alone, the header says what they mean."""
@@ -69,28 +66,6 @@ class SpeaksTus(Guarded):
         match, found = super().matches(dict(scope, method=method))
         # the log tells what was done
         return match, {**found, "method": method} if match is Match.FULL else found
-
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Answer]]:
-        """Return the handler of a request."""
-        inner = super().get_route_handler()
-
-        async def handler(request: Request) -> Answer:
-            try:
-                answer = await inner(request)
-            except (InputError, RequestValidationError, Problem) as error:
-                problem = _problem(error)
-                problem.headers.update(_SAID)
-                raise problem from None
-            answer.headers.update(_SAID)
-            return answer
-
-        return handler
-
-
-def _problem(error: InputError | RequestValidationError | Problem) -> Problem:
-    if isinstance(error, Problem):
-        return error
-    return of_input(error) if isinstance(error, InputError) else of_validation(error.errors())
 
 
 async def speaks(request: Request) -> None:
@@ -130,7 +105,7 @@ async def options(id: CampaignId, components: ThisService) -> Response:
     responses={
         201: {
             "description": "Location is where the parts go; the body is empty.",
-            "headers": _TUS | _OFFSET,
+            "headers": _TUS | OFFSET,
             "content": {"text/plain": {"schema": {"type": "string"}}},
         },
         **problems(404, 409, 412, 413, 422),
@@ -148,7 +123,7 @@ async def create(
     state = Partial(0, length, caller.group, campaign.id, name, replacing, _digest(told.get("sha256", "")))
     await finish(components, campaign, name)
     with alone(components, campaign, name):
-        offset = await run_in_threadpool(_begin, components, campaign, state)
+        offset = await run_in_threadpool(_begin, components, state)
     path = request.url_for("send_part", id=id, name=name).path
     return PlainTextResponse("", 201, {"Location": path, "Upload-Offset": str(offset)})
 
@@ -159,7 +134,7 @@ async def create(
     summary="State of an upload by tus",
     description="An offset as large as the length says that the recording is stored.",
     openapi_extra=guard("upload", parameters=_PARAMETERS),
-    responses={204: {"description": "The state of the upload.", "headers": _TUS | _OFFSET}, **problems(404, 412, 422)},
+    responses={204: {"description": "The state of the upload.", "headers": _TUS | OFFSET}, **problems(404, 412, 422)},
 )
 async def state(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
@@ -176,7 +151,7 @@ async def state(id: CampaignId, name: RecordingName, components: ThisService, ca
     description="The last part is acknowledged when the recording is read, judged and stored.",
     openapi_extra=guard("upload", requestBody=_BODY, parameters=_PARAMETERS, **{"x-content-types": (PART,)}),
     responses={
-        204: {"description": "The part is stored.", "headers": _TUS | _OFFSET},
+        204: {"description": "The part is stored.", "headers": _TUS | OFFSET},
         **problems(400, 404, 408, 409, 410, 412, 413, 415, 422, 460),
     },
 )
@@ -191,9 +166,13 @@ async def send_part(
 ) -> Response:
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
     checksum = None if announced is None else _checksum(announced)
-    length = await run_in_threadpool(_length, components, campaign, name)
-    done = await receive(request, components, campaign, name, Upload(offset), checksum)
-    return Response(status_code=204, headers={"Upload-Offset": str(done if isinstance(done, int) else length)})
+    _, there = await run_in_threadpool(components.uploads.partial, campaign.group, campaign.id, name)
+    if there is None:
+        raise Problem(404, "no such upload has begun")
+    with writing(request, components, campaign, name):
+        state = await continued(components, campaign, name, offset)
+        done = await receive(request, components, campaign, state, checksum)
+    return Response(status_code=204, headers={"Upload-Offset": str(done if isinstance(done, int) else state.length)})
 
 
 @router.delete(
@@ -211,13 +190,13 @@ async def give_up(id: CampaignId, name: RecordingName, components: ThisService, 
     return Response(status_code=204)
 
 
-def _begin(components: Components, campaign: Campaign, state: Partial) -> int:
+def _begin(components: Components, state: Partial) -> int:
     """Begin an upload, or go on with that of the same content; return its offset.
 
     Clients that meet 409 for a part ask for the offset and send what follows there. Were an upload begun anew under one of them, or
     lent to two with different files of one length, both would go on, and what both are told to be their file would be a mixture.
     """
-    path, there = components.files.partial(campaign.group, partial_name(campaign.id, state.name))
+    path, there = components.uploads.partial(state.group, state.campaign, state.name)
     if there is not None and not there.complete:
         if state.sha256 and (there.length, there.replacing, there.sha256) == (state.length, state.replacing, state.sha256):
             return there.offset
@@ -234,13 +213,6 @@ def _begin(components: Components, campaign: Campaign, state: Partial) -> int:
 def _given_up(components: Components, campaign: Campaign, name: str) -> bool:
     with components.files.lock:
         return components.uploads.give_up(campaign.group, campaign.id, name)
-
-
-def _length(components: Components, campaign: Campaign, name: str) -> int:
-    _, found = components.files.partial(campaign.group, partial_name(campaign.id, name))
-    if found is None:
-        raise Problem(404, "no such upload has begun")
-    return found.length
 
 
 def _metadata(text: str) -> dict[str, str]:

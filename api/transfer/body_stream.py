@@ -18,6 +18,8 @@ from api.components import Components
 from api.files import Full, Part, TooLarge
 from api.problems import Problem, of_disk
 from api.reading.uploads import Received
+from api.stores.campaigns import Campaign, Recording
+from api.stores.entities import Taken
 
 #: Size of a block, and amount written between two checks of the free space [bytes].
 BLOCK, LOOK = 1 << 20, 64 << 20
@@ -116,6 +118,18 @@ async def complete(part: Part) -> Received:
 
     with storage_problems():
         return await run_in_threadpool(finish)
+
+
+async def take(components: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
+    """Store a received file, or raise a problem with the reason."""
+    try:
+        with storage_problems():
+            return await components.uploads.take(campaign, name, received, replacing)
+    except Taken:
+        fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
+        raise Problem(409, "a recording with other content exists under this name", [fault]) from None
+    except KeyError:
+        raise Problem(404, "there is no such campaign") from None
 
 
 def refuse_encoded(request: Request) -> None:

@@ -126,6 +126,7 @@ def content(document: Json, described_as: Json) -> str:
 def section(document: Json, usual: dict[str, str], method: str, path: str, call: Json) -> str:
     """Return one call: what it does, who may, what it takes, what it answers."""
     lines = [f"## `{method} {path}`", "", call.get("summary", "") + ".", "", call.get("description", ""), ""]
+    lines += ["Deprecated: the header `Sunset` says until when it stays.", ""] if call.get("deprecated") else []
     lines += [f"Scope: `{call['x-scope']}`" if "x-scope" in call else "No key is asked for.", ""]
     if call.get("parameters"):
         told = [

@@ -28,6 +28,7 @@ from rcsa_ident.base.errors import InputError
 from tests.api.identifying import carried, job, running
 from tests.api.in_process import BOTH, embedded, refused, service
 from tests.api.recordings import content, declared
+from tests.api.test_tus import SAYS
 from tests.fixtures import by_hand
 from tests.fixtures.service import example
 
@@ -67,7 +68,7 @@ NAMES = ["flipped", "missing", "truncated"]
 
 @pytest.mark.parametrize("harm", HARMS, ids=NAMES)
 def test_a_damaged_upload_is_not_handed_out_and_heals(client, parts, campaign, tmp_path, harm):
-    url = f"/v1/campaigns/{campaign}/recordings/{CUT}"
+    url, where = (f"/v1/campaigns/{campaign}/{face}/{CUT}" for face in ("recordings", "uploads"))
     raw = client.http.get(f"{url}/file").content
     assert raw == (tmp_path / CUT).read_bytes()
     harm(stored(parts, campaign, CUT, UPLOADS))
@@ -77,13 +78,13 @@ def test_a_damaged_upload_is_not_handed_out_and_heals(client, parts, campaign, t
         assert f"the stored file of the recording {CUT} is " in answer.json()["detail"]
         assert "upload the same recording again" in answer.json()["detail"]
     # to somebody who sends in parts it is not there
-    assert client.http.head(url).status_code == 404
+    assert client.http.head(where, headers=SAYS).status_code == 404
     before = client.recording(campaign, CUT)
     assert client.upload(campaign, tmp_path / CUT) == before
     assert client.http.get(f"{url}/file").content == raw
     client.archive(campaign, tmp_path / "a.zip")
     assert zipfile.ZipFile(tmp_path / "a.zip").read(f"recordings/{CUT}") == raw
-    assert client.http.head(url).headers["upload-offset"] == str(len(raw))
+    assert client.http.head(where, headers=SAYS).headers["upload-offset"] == str(len(raw))
 
 
 @pytest.mark.parametrize("harm", HARMS, ids=NAMES)
@@ -135,7 +136,7 @@ def test_a_damaged_verdict_is_told_and_heals(client, parts, campaign, tmp_path, 
     client.forget_recording(campaign, AIR)
     client.upload(campaign, tmp_path / AIR)
     # to somebody who sends in parts it is not there
-    assert client.http.head(url).status_code == 404
+    assert client.http.head(f"/v1/campaigns/{campaign}/uploads/{CUT}", headers=SAYS).status_code == 404
     assert client.upload(campaign, tmp_path / CUT) == before
     assert client.recording(campaign, CUT) == before
     assert client.campaign(campaign).usable == usable

@@ -15,7 +15,7 @@ from api.reading.samples import read_normalised
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
 from rcsa_ident.io.recordings.readers import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.api.in_process import refused, service
+from tests.api.in_process import refused
 from tests.api.recordings import RATE, RPM, channels, content, declared, pair
 from tests.fixtures.recording_formats import FORMATS
 
@@ -270,97 +270,6 @@ def test_of_a_path_in_a_form_the_last_part_counts(client, campaign, tmp_path):
         assert [item["status"] for item in answer.json()["items"]] == [status], name
     answer = client.http.post(f"/v1/campaigns/{campaign}/recordings", data={"note": "x"}, files=[("f", ("c0_cut.h5", raw))])
     assert [item["status"] for item in answer.json()["items"]] == [404, 200]
-
-
-@pytest.mark.slow
-def test_parts_follow_each_other(client, campaign, tmp_path):
-    url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
-
-    def patch(offset, data, **further):
-        headers = BINARY | {"Upload-Offset": str(offset), "Upload-Length": str(len(raw))} | further
-        return client.http.patch(url, content=data, headers=headers)
-
-    def head():
-        answer = client.http.head(url)
-        return answer.status_code, answer.headers.get("upload-offset"), answer.headers.get("upload-length")
-
-    assert head()[0] == 404
-    answer = patch(0, raw[:1000])
-    assert (answer.status_code, answer.headers["upload-offset"]) == (204, "1000")
-    assert head() == (204, "1000", str(len(raw)))
-    for offset in (0, 999, 1001, len(raw)):
-        answer = patch(offset, raw[offset : offset + 10])
-        assert (answer.status_code, answer.headers["upload-offset"]) == (409, "1000")
-    # a damaged part is not kept
-    told = digest(raw[1000:2000])["Repr-Digest"]
-    assert patch(1000, raw[1000:1999] + b"?", **{"Content-Digest": told}).status_code == 422
-    assert head()[1] == "1000"
-    assert patch(1000, raw[1000:2000], **{"Content-Digest": told}).status_code == 204
-    # more than was told of
-    assert patch(2000, raw[2000:] + b"x").status_code == 422
-    assert head()[1] == "2000"
-    assert client.http.get(url).status_code == 404
-    last = patch(2000, raw[2000:], **digest(raw))
-    assert last.status_code == 201
-    assert last.json()["sha256"] == hashlib.sha256(raw).hexdigest()
-    assert head() == (204, str(len(raw)), str(len(raw)))
-    assert len(files_in(tmp_path)) == 2
-    # the answer was lost, and the client asks again
-    assert patch(len(raw), b"").headers["upload-offset"] == str(len(raw))
-
-
-def test_a_first_part_of_another_length_begins_anew(client, campaign, tmp_path):
-    url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
-    headers = BINARY | {"Upload-Offset": "0"}
-    assert client.http.patch(url, content=b"abc", headers=headers).json()["errors"][0]["field"] == "Upload-Length"
-    assert client.http.patch(url, content=b"abc", headers=headers | {"Upload-Length": "10"}).status_code == 204
-    whole = client.http.patch(url, content=raw, headers=headers | {"Upload-Length": str(len(raw))})
-    assert whole.status_code == 201
-    for length in ("-1", "x", "1e3", str(10**16)):
-        assert client.http.patch(url, content=b"", headers=headers | {"Upload-Length": length}).status_code == 422
-    too_long = client.http.patch(url, content=b"", headers=headers | {"Upload-Length": str(10**13)})
-    assert too_long.status_code == 413
-
-
-def test_a_wrong_whole_is_given_up(client, campaign, tmp_path):
-    url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
-    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
-    assert client.http.patch(url, content=raw, headers=headers | digest(b"else")).status_code == 422
-    assert client.http.head(url).status_code == 404
-    assert client.http.patch(url, content=b"?" * len(raw), headers=headers).status_code == 422
-    assert client.http.head(url).status_code == 404
-    assert files_in(tmp_path) == []
-
-
-@pytest.mark.slow
-def test_parts_of_another_content_wait_for_a_word(client, campaign, tmp_path):
-    url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path, 1)
-    client.upload(campaign, made(tmp_path, "c0_cut.h5"))
-    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
-    assert client.http.patch(url, content=raw, headers=headers).status_code == 409
-    # nothing has to be sent twice
-    headers["Upload-Offset"] = str(len(raw))
-    assert client.http.patch(f"{url}?replace=true", content=b"", headers=headers).status_code == 201
-    assert client.recording(campaign, "c0_cut.h5").sha256 == hashlib.sha256(raw).hexdigest()
-    assert len(files_in(tmp_path)) == 2
-
-
-def test_parts_outlive_the_service(store, tmp_path):
-    raw = content(tmp_path)
-    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
-    with service(store, tmp_path) as http:
-        machine = http.post("/v1/machines", json={"name": "m"}).json()["id"]
-        id = http.post(f"/v1/machines/{machine}/campaigns", json=declared()).json()["id"]
-        url = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
-        assert http.patch(url, content=raw[:5000], headers=headers).status_code == 204
-    with service(store, tmp_path) as http:
-        assert http.head(url).headers["upload-offset"] == "5000"
-        assert http.patch(url, content=raw[5000:], headers=headers | {"Upload-Offset": "5000"}).status_code == 201
-        # a part that nobody goes on with
-        url = f"/v1/campaigns/{id}/recordings/c0_air.h5"
-        assert http.patch(url, content=raw[:5000], headers=headers).status_code == 204
-        assert http.delete(url).status_code == 204
-        assert http.head(url).status_code == 404
 
 
 def test_the_client_goes_on_after_lost_connections(client, campaign, tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ from tusclient.exceptions import TusCommunicationError
 
 from api.client import Client
 from api.files import Part
-from tests.api.in_process import embedded, service
+from tests.api.in_process import embedded, refused, service
 from tests.api.recordings import content, declared
 from tests.fixtures.paths import ROOT
 from tests.fixtures.service import serving
@@ -73,21 +73,7 @@ def test_parts_become_the_recording(place):
     assert (last.status_code, last.headers["upload-offset"]) == (204, str(len(raw)))
     recording = client.get(f"{path.removesuffix('uploads')}recordings/{NAME}").json()
     assert recording["sha256"] == hashlib.sha256(raw).hexdigest()
-    # and both faces tell the same of it
-    for face in ("uploads", "recordings"):
-        assert client.head(f"{path.removesuffix('uploads')}{face}/{NAME}", headers=SAYS).headers["upload-offset"] == str(len(raw))
-
-
-def test_both_faces_write_the_same_upload(place):
-    client, path, raw = place
-    where = begun(client, path, len(raw))
-    assert sent(client, where, raw[:1000], 0).status_code == 204
-    answer = client.patch(
-        f"{path.removesuffix('uploads')}recordings/{NAME}",
-        content=raw[1000:],
-        headers={"Upload-Offset": "1000", "Content-Type": "application/octet-stream"},
-    )
-    assert answer.status_code == 201
+    assert client.head(where, headers=SAYS).headers["upload-offset"] == str(len(raw))
 
 
 def test_a_part_with_another_checksum_is_not_kept(place):
@@ -111,10 +97,13 @@ def test_what_breaks_the_protocol_is_refused(place):
     where = begun(client, path, len(raw))
     version = client.head(where)
     assert (version.status_code, version.headers["tus-version"]) == (412, "1.0.0")
-    wrong = sent(client, where, raw[:10], 5)
-    assert (wrong.status_code, wrong.headers["upload-offset"], wrong.headers["tus-resumable"]) == (409, "0", "1.0.0")
+    assert sent(client, where, raw[:1000], 0).status_code == 204
+    for offset in (0, 999, 1001, len(raw)):
+        wrong = sent(client, where, raw[offset : offset + 10], offset)
+        assert (wrong.status_code, wrong.headers["upload-offset"], wrong.headers["tus-resumable"]) == (409, "1000", "1.0.0")
     assert client.patch(where, content=raw[:10], headers=SAYS | {"Upload-Offset": "0", "Content-Type": "text/plain"}).status_code == 415
-    assert sent(client, where, raw + b"more", 0).status_code == 422
+    assert sent(client, where, raw[1000:] + b"x", 1000).status_code == 422
+    assert client.head(where, headers=SAYS).headers["upload-offset"] == "1000"
     assert sent(client, f"{path}/nobody.h5", raw, 0).status_code == 404
     for headers, status in (
         ({"Upload-Metadata": metadata(filename=NAME)}, 422),
@@ -225,15 +214,48 @@ def test_the_same_content_goes_on_where_it_stands(place):
     assert sent(client, where, raw[1000:], 1000).status_code == 204
 
 
+def test_the_client_goes_on_with_its_own_content_alone(place, client, tmp_path):
+    """A mixture of two files of one length would be neither."""
+    http, path, raw = place
+    id, other = path.split("/")[3], content(tmp_path, 1)
+    (tmp_path / NAME).write_bytes(raw)
+    assert len(other) == len(raw)
+    sent(http, begun(http, path, len(raw), sha256=hashlib.sha256(other).hexdigest()), other[:1000], 0)
+    assert client.upload_in_parts(id, tmp_path / NAME, part=50_000).sha256 == hashlib.sha256(raw).hexdigest()
+    (tmp_path / NAME).write_bytes(other)
+    assert "?replace=true" in refused(409, client.upload_in_parts, id, tmp_path / NAME).errors[0].allowed
+    assert client.upload_in_parts(id, tmp_path / NAME, replace=True).sha256 == hashlib.sha256(other).hexdigest()
+
+
 @pytest.mark.slow
 def test_a_file_that_is_not_the_announced_one_is_refused_at_its_end(place):
     client, path, raw = place
     headers = SAYS | {"Upload-Length": str(len(raw)), "Upload-Metadata": metadata(filename=NAME, sha256="ABC")}
     assert client.post(path, headers=headers).status_code == 422
-    where = begun(client, path, len(raw), sha256="0" * 64)
-    answer = sent(client, where, raw, 0)
-    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "Upload-Metadata")
-    assert client.head(where, headers=SAYS).status_code == 404
+    # nor is one that cannot be read
+    for sha256, whole, field in (("0" * 64, raw, "Upload-Metadata"), ("", b"?" * len(raw), "recording")):
+        where = begun(client, path, len(raw), sha256=sha256)
+        answer = sent(client, where, whole, 0)
+        assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, field)
+        assert client.head(where, headers=SAYS).status_code == 404
+    assert [each for each in client.app.state.components.files.folder.rglob("*") if each.is_file()] == []
+
+
+def test_parts_outlive_the_service(store, tmp_path):
+    raw = content(tmp_path)
+    with service(store, tmp_path) as http:
+        client = Client(http=http)
+        path = f"/v1/campaigns/{client.make_campaign(client.make_machine('m').id, declared(2)).id}/uploads"
+        where = begun(http, path, len(raw))
+        assert sent(http, where, raw[:5000], 0).status_code == 204
+    with service(store, tmp_path) as http:
+        assert http.head(where, headers=SAYS).headers["upload-offset"] == "5000"
+        assert sent(http, where, raw[5000:], 5000).status_code == 204
+        # a part that nobody goes on with
+        where = begun(http, path, len(raw), filename="c0_air.h5")
+        assert sent(http, where, raw[:5000], 0).status_code == 204
+        assert http.delete(where.replace("uploads", "recordings")).status_code == 204
+        assert http.head(where, headers=SAYS).status_code == 404
 
 
 def test_an_upload_that_is_being_stored_never_seems_not_to_have_begun(store, tmp_path, monkeypatch):
@@ -300,7 +322,7 @@ DYING = """
 import os, signal, sys
 from pathlib import Path
 from api.reading.uploads import Uploads
-from tests.api.in_process import embedded, service
+from tests.api.in_process import embedded, refused, service
 from tests.api.test_tus import sent
 
 folder, where, offset, when = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), sys.argv[4]

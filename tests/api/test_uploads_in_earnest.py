@@ -21,7 +21,7 @@ import pytest
 import uvicorn
 
 from api.client import Client
-from api.files import STALE_FILE, STALE_PART, UPLOADS
+from api.files import STALE_FILE, STALE_PART, UPLOADS, Part
 from api.main import create_app
 from api.reading.examine import write_normalised
 from api.settings import Settings
@@ -29,6 +29,7 @@ from api.stores.entities import Unavailable
 from api.stores.sql import open_store
 from tests.api.in_process import Here, embedded, refused, service
 from tests.api.recordings import content, declared
+from tests.api.test_tus import PART, SAYS, begun, sent
 from tests.fixtures.waiting import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -65,12 +66,21 @@ def place(tmp_path):
     return made
 
 
+@pytest.fixture
+def opened(monkeypatch) -> list[Part]:
+    """The parts of resumable uploads that a request has begun to write."""
+    parts: list[Part] = []
+    monkeypatch.setattr("api.transfer.resumable.Part", lambda *arguments: parts.append(Part(*arguments)) or parts[-1])
+    return parts
+
+
 def files_in(folder: Path) -> list[Path]:
     return [p for p in (folder / "files").rglob("*") if p.is_file()]
 
 
 def head(method: str, path: str, *further: str) -> bytes:
-    lines = [f"{method} {path} HTTP/1.1", "Host: localhost", "Content-Type: application/octet-stream", *further]
+    told = PART | {"Upload-Offset": "0"} if method == "PATCH" else BINARY
+    lines = [f"{method} {path} HTTP/1.1", "Host: localhost", *(f"{name}: {value}" for name, value in told.items()), *further]
     return "\r\n".join([*lines, "", ""]).encode()
 
 
@@ -104,19 +114,21 @@ def test_a_body_without_an_end_is_cut_off(place, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["PUT", "PATCH"])
-def test_a_client_that_goes_half_way(place, tmp_path, method):
+def test_a_client_that_goes_half_way(place, opened, tmp_path, method):
     raw = content(tmp_path)
     with place() as (client, port, id):
         path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
+        if method == "PATCH":
+            path = begun(client.http, f"/v1/campaigns/{id}/uploads", len(raw), sha256=hashlib.sha256(raw).hexdigest())
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
-            link.sendall(head(method, path, f"Content-Length: {len(raw)}", "Upload-Offset: 0", f"Upload-Length: {len(raw)}") + raw[:20_000])
-            until(lambda: files_in(tmp_path) != [])
+            link.sendall(head(method, path, f"Content-Length: {len(raw)}") + raw[:20_000])
+            until(lambda: opened if method == "PATCH" else files_in(tmp_path))
         if method == "PUT":
             until(lambda: files_in(tmp_path) == [])
-            assert client.http.head(path).status_code == 404
+            assert client.http.get(path).status_code == 404
         else:
             # what has come is kept, and the client goes on
-            until(lambda: client.http.head(path).headers.get("upload-offset") == "20000")
+            until(lambda: client.http.head(path, headers=SAYS).headers.get("upload-offset") == "20000")
             (tmp_path / "c0_cut.h5").write_bytes(raw)
             assert client.upload_in_parts(id, tmp_path / "c0_cut.h5").sha256 == hashlib.sha256(raw).hexdigest()
         assert client.upload(id, _written(tmp_path, raw)).verdict.usable
@@ -179,18 +191,19 @@ def test_too_many_at_once_are_told_to_wait(place, tmp_path):
     raw = content(tmp_path)
     with place(uploads=2) as (client, port, id):
         path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
+        where = begun(client.http, f"/v1/campaigns/{id}/uploads", len(raw), filename="c1_cut.h5")
         links = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(2)]
         for link in links:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw)}") + raw[:1000])
-        until(lambda: len(files_in(tmp_path)) == 2)
-        for method in ("PUT", "PATCH"):
-            headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
-            answer = _answered(lambda method=method, headers=headers: client.http.request(method, path, content=raw, headers=headers))
+        until(lambda: len(files_in(tmp_path)) == 4)
+        for upload in (lambda: client.http.put(path, content=raw, headers=BINARY), lambda: sent(client.http, where, raw, 0)):
+            answer = _answered(upload)
             assert (answer.status_code, answer.headers["retry-after"]) == (503, "2")
         # reads go on
         assert client.campaign(id).usable == 0
         for link in links:
             link.close()
+        assert client.http.delete(where, headers=SAYS).status_code == 204
         until(lambda: files_in(tmp_path) == [])
         assert client.upload(id, _written(tmp_path, raw)).verdict.usable
 
@@ -228,19 +241,17 @@ def test_uploads_of_one_name_at_once(place, tmp_path):
 
 
 @pytest.mark.slow
-def test_two_who_write_the_same_parts(place, tmp_path):
+def test_two_who_write_the_same_parts(place, opened, tmp_path):
     raw = content(tmp_path)
     with place() as (client, port, id):
-        path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
-        told = ["Upload-Offset: 0", f"Upload-Length: {len(raw)}"]
+        where = begun(client.http, f"/v1/campaigns/{id}/uploads", len(raw))
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
-            link.sendall(head("PATCH", path, f"Content-Length: {len(raw)}", *told) + raw[:2000])
-            until(lambda: files_in(tmp_path) != [])
-            headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
-            assert client.http.patch(path, content=raw, headers=headers).status_code == 503
+            link.sendall(head("PATCH", where, f"Content-Length: {len(raw)}") + raw[:2000])
+            until(lambda: opened)
+            assert sent(client.http, where, raw, 0).status_code == 503
             link.sendall(raw[2000:])
             link.settimeout(PATIENCE)
-            assert link.recv(65536).split(b" ", 2)[1] == b"201"
+            assert link.recv(65536).split(b" ", 2)[1] == b"204"
 
 
 @pytest.mark.slow
@@ -288,19 +299,18 @@ def test_parts_outlive_a_full_disk(http, client, tmp_path, monkeypatch):
     """While a recording is read: nothing is wrong with it, and it need not be sent again."""
     campaign = client.make_campaign(client.make_machine("m").id, declared(1)).id
     url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
-    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
+    where = begun(http, f"/v1/campaigns/{campaign}/uploads", len(raw))
 
     def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("api.reading.examine.write_normalised", full)
-    for sent in (http.patch(url, content=raw, headers=headers), http.put(url, content=raw, headers=BINARY)):
-        assert sent.status_code == 503
-        assert sent.json()["detail"] == "the disk is full"
+    for answer in (sent(http, where, raw, 0), http.put(url, content=raw, headers=BINARY)):
+        assert (answer.status_code, answer.json()["detail"]) == (503, "the disk is full")
     # neither is it told to be there
-    assert http.head(url).status_code == 503
+    assert http.head(where, headers=SAYS).status_code == 503
     monkeypatch.undo()
-    answer = http.head(url)
+    answer = http.head(where, headers=SAYS)
     assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(len(raw)))
     assert client.recording(campaign, "c0_cut.h5").sha256 == hashlib.sha256(raw).hexdigest()
     assert len(files_in(tmp_path)) == 2
@@ -315,18 +325,18 @@ def test_parts_outlive_a_database_that_takes_no_row(http, client, tmp_path, monk
         raise Unavailable
 
     monkeypatch.setattr(http.app.state.components.store.recordings, "put", full)
-    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
-    assert http.patch(url, content=raw, headers=headers).status_code == 503
-    assert http.head(url).status_code == 503
+    where = begun(http, f"/v1/campaigns/{campaign}/uploads", len(raw))
+    assert sent(http, where, raw, 0).status_code == 503
+    assert http.head(where, headers=SAYS).status_code == 503
     monkeypatch.undo()
-    answer = http.head(url)
+    answer = http.head(where, headers=SAYS)
     assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(len(raw)))
     assert http.get(f"{url}/file").content == raw
     assert len(files_in(tmp_path)) == 2
 
 
-@pytest.mark.parametrize("face", ["put", "patch"])
-def test_a_sweep_while_an_upload_is_stored_takes_nothing_of_it(http, client, tmp_path, monkeypatch, face):
+@pytest.mark.parametrize("in_parts", [False, True])
+def test_a_sweep_while_an_upload_is_stored_takes_nothing_of_it(http, client, tmp_path, monkeypatch, in_parts):
     """Whatever the clock shows: neither what is being read, nor files whose row does not stand yet."""
     campaign = client.make_campaign(client.make_machine("m").id, declared(1)).id
     url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
@@ -348,7 +358,10 @@ def test_a_sweep_while_an_upload_is_stored_takes_nothing_of_it(http, client, tmp
     monkeypatch.setattr(time, "time", lambda: clock() + 30.0 * STALE_PART)
     monkeypatch.setattr("api.reading.examine.write_normalised", reading)
     monkeypatch.setattr(components.store.recordings, "put", storing)
-    assert http.request(face, url, content=raw, headers=BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}).status_code == 201
+    if in_parts:
+        assert sent(http, begun(http, f"/v1/campaigns/{campaign}/uploads", len(raw)), raw, 0).status_code == 204
+    else:
+        assert http.put(url, content=raw, headers=BINARY).status_code == 201
     sweeps[0].join()
     assert hashlib.sha256(http.get(f"{url}/file").content).hexdigest() == hashlib.sha256(raw).hexdigest()
     assert len(files_in(tmp_path)) == 2
@@ -357,7 +370,6 @@ def test_a_sweep_while_an_upload_is_stored_takes_nothing_of_it(http, client, tmp
 @pytest.mark.parametrize("replacing", [False, True])
 def test_a_complete_upload_is_stored_after_a_kill(store, tmp_path, monkeypatch, replacing):
     raw, other = content(tmp_path), content(tmp_path, 1)
-    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
     with service(store, tmp_path) as http:
         machine = http.post("/v1/machines", json={"name": "m"}).json()["id"]
         id = http.post(f"/v1/machines/{machine}/campaigns", json=declared()).json()["id"]
@@ -368,8 +380,9 @@ def test_a_complete_upload_is_stored_after_a_kill(store, tmp_path, monkeypatch, 
         async def killed(*_):
             raise RuntimeError("leaves what a kill leaves")
 
+        where = begun(http, f"/v1/campaigns/{id}/uploads", len(raw), replace=str(replacing).lower())
         monkeypatch.setattr("api.reading.uploads.Uploads.take", killed)
-        assert http.patch(f"{url}?replace={str(replacing).lower()}", content=raw, headers=headers).status_code == 500
+        assert sent(http, where, raw, 0).status_code == 500
         monkeypatch.undo()
     with service(store, tmp_path) as http:
         until(lambda: (http.get(url).json() if http.get(url).status_code == 200 else {}).get("sha256") == hashlib.sha256(raw).hexdigest())

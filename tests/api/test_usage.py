@@ -19,6 +19,7 @@ from rcsa_ident.io.toml_text import toml_of
 from tests.api.identifying import job, running
 from tests.api.in_process import BOTH, embedded, refused, service
 from tests.api.recordings import TOOLING, content, declared
+from tests.api.test_tus import begun, sent
 from tests.fixtures import by_hand
 
 TOML = {"Content-Type": "application/toml"}
@@ -197,8 +198,7 @@ def test_files_are_told_by_kind(client, tmp_path):
     raw = content(tmp_path)
     (tmp_path / "c0_cut.h5").write_bytes(raw)
     client.upload(campaign, tmp_path / "c0_cut.h5")
-    headers = {"Content-Type": "application/octet-stream", "Upload-Offset": "0", "Upload-Length": "5000"}
-    client.http.patch(f"/v1/campaigns/{campaign}/recordings/c0_air.h5", content=bytes(1000), headers=headers)
+    sent(client.http, begun(client.http, f"/v1/campaigns/{campaign}/uploads", 5000, filename="c0_air.h5"), bytes(1000), 0)
     told = client.usage().files
     assert told.kinds[UPLOADS] == len(raw)
     assert told.kinds[NORMALISED] > 1000

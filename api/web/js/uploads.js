@@ -6,6 +6,7 @@ const AT_ONCE = 3;
 const LARGE = 8e6;
 const PIECE = 4e6;
 const TRIES = 5;
+const TUS = { "Tus-Resumable": "1.0.0" };
 const queues = new Map();
 
 /** The files that a campaign names, of cuts, in the air and of hammer tests, each with `uploaded`. */
@@ -43,7 +44,7 @@ class Queue extends EventTarget {
     // in the campaign's order: verdicts come from the top
     for (const file of [...names].map((name) => given.get(name)).filter(Boolean)) {
       if (this.items.get(file.name)?.state === "sending") continue;
-      this.items.set(file.name, { name: file.name, file, state: "waiting", sent: 0, problem: null, recording: null, replace: false });
+      this.items.set(file.name, { name: file.name, file, state: "waiting", sent: 0, problem: null, replace: false });
     }
     this.changed();
     this.pump();
@@ -76,23 +77,22 @@ class Queue extends EventTarget {
   }
 
   async send(item) {
-    const path = `campaigns/${part(this.id)}/recordings/${part(item.name)}${item.replace ? "?replace=true" : ""}`;
-    const progress = (sent) => {
-      item.sent = sent;
+    const campaign = `campaigns/${part(this.id)}`;
+    const recording = `${campaign}/recordings/${part(item.name)}${item.replace ? "?replace=true" : ""}`;
+    const progress = (bytes) => {
+      item.sent = bytes;
       this.changed(item);
     };
     for (let turn = 1; ; turn += 1) {
       try {
-        item.recording =
-          item.file.size > LARGE && !item.replace
-            ? await inPieces(path, item.file, progress)
-            : await whole("PUT", path, item.file, {}, progress);
+        if (item.file.size > LARGE && !item.replace) await inPieces(`${campaign}/uploads`, item, progress);
+        else await sent("PUT", recording, item.file, { "Content-Type": "application/octet-stream" }, progress);
         item.state = "done";
         return;
       } catch (error) {
         if (!(error instanceof Problem)) throw error;
-        // nothing there, too much at once, or on its way down: all of this passes
-        const passes = error.status === 0 || error.status === 429 || error.status >= 500;
+        // nothing there, too much at once, on its way down, or at another offset meanwhile: all of this passes
+        const passes = error.status === 0 || error.status === 429 || error.status >= 500 || error.headers?.has("upload-offset");
         if (!passes || turn >= TRIES) {
           Object.assign(item, { state: "failed", problem: error });
           return;
@@ -104,21 +104,20 @@ class Queue extends EventTarget {
   }
 }
 
-/** Send a body with its progress, which fetch does not tell; returns the answer's JSON, or the headers of an empty one. */
-function whole(method, path, body, headers, progress) {
+/** Send a body with its progress, which fetch does not tell; returns the answer's `Upload-Offset`. */
+function sent(method, path, body, headers, progress) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open(method, at(path));
-    for (const [name, value] of Object.entries({ "Content-Type": "application/octet-stream", ...keyHeaders(), ...headers }))
-      request.setRequestHeader(name, value);
+    for (const [name, value] of Object.entries({ ...keyHeaders(), ...headers })) request.setRequestHeader(name, value);
     request.upload.onprogress = (event) => progress(event.loaded);
-    const told = new Headers();
     request.onload = () => {
+      const told = new Headers();
       for (const name of ["retry-after", "upload-offset"]) {
         const value = request.getResponseHeader(name);
         if (value !== null) told.set(name, value);
       }
-      if (request.status >= 200 && request.status < 300) resolve(request.status === 204 ? told : JSON.parse(request.responseText));
+      if (request.status >= 200 && request.status < 300) resolve(Number(told.get("upload-offset")));
       else reject(problemOf(request.status, request.responseText, told));
     };
     request.onerror = () => reject(problemOf(0, ""));
@@ -126,33 +125,31 @@ function whole(method, path, body, headers, progress) {
   });
 }
 
-/** Send a file in pieces, from where the service says that it has it. */
-async function inPieces(path, file, progress) {
-  let offset = await offsetOf(path, file.size);
-  for (;;) {
-    const piece = file.slice(offset, offset + PIECE);
-    const headers = { "Upload-Offset": String(offset), "Upload-Length": String(file.size) };
-    try {
-      const answer = await whole("PATCH", path, piece, headers, (sent) => progress(offset + sent));
-      if (!(answer instanceof Headers)) return answer;
-      offset = Number(answer.get("upload-offset"));
-    } catch (error) {
-      const right = error.headers?.get("upload-offset");
-      // another content under this name is a problem; another offset is not
-      if (error.status !== 409 || right === null || right === undefined || Number(right) === offset) throw error;
-      offset = Number(right);
-    }
+/** Send a file in pieces by tus, from where the service has it. */
+async function inPieces(uploads, { name, file }, progress) {
+  const path = `${uploads}/${part(name)}`;
+  let offset = (await offsetOf(path, file.size)) ?? (await begun(uploads, name, file.size));
+  while (offset < file.size) {
+    const headers = { ...TUS, "Content-Type": "application/offset+octet-stream", "Upload-Offset": String(offset) };
+    offset = await sent("PATCH", path, file.slice(offset, offset + PIECE), headers, (bytes) => progress(offset + bytes));
   }
 }
 
+/** Where an unfinished upload of this length goes on; null where there is none, one of another length being given up. */
 async function offsetOf(path, size) {
   try {
-    const answer = await send("HEAD", path);
-    const length = Number(answer.headers.get("upload-length"));
-    const offset = Number(answer.headers.get("upload-offset"));
-    return length === size && offset < size ? offset : 0;
+    const { headers } = await send("HEAD", path, { headers: TUS });
+    const [offset, length] = ["upload-offset", "upload-length"].map((name) => Number(headers.get(name)));
+    if (offset < length && length === size) return offset;
+    if (offset < length) await send("DELETE", path, { headers: TUS });
   } catch (error) {
-    if (error.status === 404) return 0;
-    throw error;
+    if (error.status !== 404) throw error;
   }
+  return null;
+}
+
+async function begun(uploads, name, size) {
+  const metadata = `filename ${btoa(String.fromCharCode(...new TextEncoder().encode(name)))}`;
+  const answer = await send("POST", uploads, { headers: { ...TUS, "Upload-Length": String(size), "Upload-Metadata": metadata } });
+  return Number(answer.headers.get("upload-offset"));
 }
