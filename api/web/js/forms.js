@@ -1,6 +1,6 @@
 // Fields with their labels, hints and faults, and problem documents put beside the fields that they name.
 import { h, note, tell } from "./dom.js";
-import { quantityInput, u } from "./units.js";
+import { kindOf, quantityInput, u } from "./units.js";
 
 let count = 0;
 
@@ -25,6 +25,10 @@ export function quantity(label, kind, value, options = {}) {
   box.input = input;
   return box;
 }
+
+/** A quantity of a declared key of a noun. */
+export const declaredField = ({ key, label, unit, hint }, noun, value, props = {}) =>
+  quantity(label, kindOf(unit), value ?? null, { name: `${noun}.${key}`, hint, props });
 
 /** A choice from a list of [value, words]. */
 export function select(options, chosen, props = {}) {
