@@ -30,7 +30,7 @@ export function quantity(label, kind, value, options = {}) {
 export const declaredField = ({ key, label, unit, hint }, noun, value, props = {}) =>
   quantity(label, kindOf(unit), value ?? null, { name: `${noun}.${key}`, hint, props });
 
-/** A choice from a list of [value, words]. */
+/** A choice from a list of [value, words]: the first one where none of them is chosen. */
 export function select(options, chosen, props = {}) {
   return h(
     "select",

@@ -23,21 +23,14 @@ export function changeForm({ subject, materials, kinds, query, onchange }) {
   const runout = quantityListInput("displacement", runoutOf(query), { placeholder: "0 8 0 8" });
   fields.runout = field("Run-out, tooth by tooth", runout, { name: "cut.runout_um", unit: "displacement" });
   fields.runout.input = runout;
-  const picked = (name, options, usual) => {
-    const given = query.get(name) ?? usual;
-    return select(options, options.some(([value]) => value === given) ? given : usual);
-  };
-  const strategy = picked("st", STRATEGIES, "down");
-  const stocks = [
-    ["", "As where it cut before"],
-    ["block", "A block"],
-  ];
-  const stock = picked("stock", stocks, "");
+  const strategy = select(STRATEGIES, query.get("st"));
+  const stock = select([["", "As where it cut before"], ["block", "A block"]], query.get("stock"));
   // along a wall a block is but another radial immersion
   const shaped = subject.shaped || stock.value !== "";
-  const direction = picked("fd", DIRECTIONS, "+X");
-  const method = picked("method", kinds, QUICK);
-  const material = picked("material", [["", subject.material ?? "Choose one, or write coefficients"], ...materials.map((each) => [each.name, each.name])], "");
+  const direction = select(DIRECTIONS, query.get("fd"));
+  const method = select(kinds, query.get("method"));
+  const matters = [["", subject.material ?? "Choose one, or write coefficients"], ...materials.map((each) => [each.name, each.name])];
+  const material = select(matters, query.get("material"));
   const button = h("button", { class: "primary" }, "Compute");
   const form = { tested: { name: query.get("cutfile") ?? "", cuts: fromAddress(query.get("cuts") ?? "") }, button };
   const slow = () => method.value !== QUICK;

@@ -91,14 +91,11 @@ export function jointSliders(onmove, onchosen) {
 
 /** The form: `element`, `body(robot)` for lobes, `state()` for the address, `robot`, `tooling`. */
 export function robotForm({ robots, toolings, materials, query, sliders, onrobot, onask, onforget }) {
-  const picked = (options, given) => (options.some(([value]) => value === given) ? given : (options[0]?.[0] ?? ""));
-  const arms = robots.map((each) => [each.name, each.words]);
-  const robot = select(arms, picked(arms, query.get("robot")));
+  const robot = select(robots.map((each) => [each.name, each.words]), query.get("robot"));
   const tools = [["", "None"], ...toolings.map((each) => [each.name, each.name])];
-  const tooling = select(tools, picked(tools, query.get("tooling") ?? toolings[0]?.name));
-  const matters = materials.map((each) => [each.name, each.name]);
-  const material = select(matters, picked(matters, query.get("material")));
-  const strategy = select(STRATEGIES, picked(STRATEGIES, query.get("st")));
+  const tooling = select(tools, query.get("tooling") ?? toolings[0]?.name);
+  const material = select(materials.map((each) => [each.name, each.name]), query.get("material"));
+  const strategy = select(STRATEGIES, query.get("st"));
   const only = h("input", { type: "checkbox", checked: query.get("only") === "yes" });
   const fields = numberFields(NUMBERS, query);
   const forget = h("button", { type: "button", class: "quiet danger small", onclick: () => onforget(robot.value) }, "Forget it");
