@@ -17,6 +17,7 @@ from api.files import Full, no_room
 from api.stores.entities import Damaged, NoRoom
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.validated_table import describe
+from rcsa_ident.setup.fields import COEFFICIENTS
 
 log = logging.getLogger("rcsa_ident.service")
 MEDIA_TYPE = "application/problem+json"
@@ -28,14 +29,11 @@ _FIELDS = {
     "runout": "cut.runout_um",
     "tangential coefficient": "cut.ktc_mpa",
     "radial ratio": "cut.krc",
-    "radial_ratio": "cut.krc",
-    "axial_ratio": "cut.kac",
+    **{each.name: f"cut.{each.key}" for each in COEFFICIENTS},
     "y_from and y_to": "cut.y_from_mm",
     "engagement map": "cut.engagement",
     "engagement map heights": "cut.engagement",
     "engagement map angles": "cut.engagement",
-    "tangential_edge": "cut.kte_n_per_mm",
-    "radial_edge": "cut.kre_n_per_mm",
     "feed_per_tooth": "cut.feed_per_tooth_mm",
     "bore": "bore_mm",
     "mass": "mass_g",

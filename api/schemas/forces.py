@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
 
 from api.schemas.campaigns import SensorKeys
 from api.schemas.common import Answer, Body, Id, Line
-from api.schemas.queries import Depth, Percent, Tooling
+from api.schemas.queries import Cut, Depth, Percent, Tooling
 from api.schemas.toolings import EXAMPLE
 from api.work.forces import ForceQuestion, WornQuestion
-from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.io.settings.cuts import FEED_DIRECTIONS
 
 MOST_CHANNELS = 32
 #: Sampling rates of a stream [Hz]; those of a file may be higher.
@@ -49,16 +46,10 @@ class WornCut(Body):
 
     def question(self) -> WornQuestion:
         """Return the cut in SI."""
-        if (self.entry_deg is None) != (self.exit_deg is None):
-            raise InputError("cut.exit_deg" if self.exit_deg is None else "cut.entry_deg", "nothing", "both angles, or neither")
-        engagement = Engagement.from_immersion(self.immersion, self.strategy)
-        if self.entry_deg is not None and self.exit_deg is not None:
-            if self.exit_deg - self.entry_deg < 0.1:
-                raise InputError("cut.exit_deg", self.exit_deg, f"at least 0.1 above entry_deg, {self.entry_deg:g} [deg]")
-            engagement = Engagement(math.radians(self.entry_deg), math.radians(self.exit_deg))
-        direction = self.feed_direction
-        angle = FEED_DIRECTIONS[direction] if isinstance(direction, str) else math.radians(direction)
-        return WornQuestion(self.axial_depth_mm * 1e-3, self.feed_per_tooth_mm * 1e-3, engagement, float(angle))
+        cut = Cut(**self.model_dump(exclude={"axial_depth_mm", "feed_per_tooth_mm"})).spec()
+        told = cut.engagement
+        engagement = told if isinstance(told, Engagement) else Engagement.from_immersion(self.immersion, self.strategy)
+        return WornQuestion(self.axial_depth_mm * 1e-3, self.feed_per_tooth_mm * 1e-3, engagement, cut.feed_angle)
 
 
 class ForceKeys(Body):

@@ -11,7 +11,7 @@ import typer
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn
 from rcsa_ident.cli.conditions import change_of, cut_of, idle_tip
 from rcsa_ident.cli.lobes import Plot, ResultFile, check_plot
-from rcsa_ident.cli.options import CutOptions, SpeedOptions, takes_groups
+from rcsa_ident.cli.options import CutOptions, SpeedOptions, option, takes_groups
 from rcsa_ident.cli.results import read_machine
 
 if TYPE_CHECKING:
@@ -28,10 +28,8 @@ def cases(
     result: ResultFile,
     file: Annotated[Path, typer.Argument(metavar="CASES.toml", help="Configurations with their tested cuts.", show_default=False)],
     speeds: SpeedOptions,
-    ktc_mpa: Annotated[
-        float | None, typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False)
-    ] = None,
-    krc: Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)] = None,
+    ktc_mpa: Annotated[float | None, option("ktc_mpa")] = None,
+    krc: Annotated[float | None, option("krc")] = None,
     plot: Plot = None,
     json_: Json = False,
 ) -> None:

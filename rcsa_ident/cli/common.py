@@ -18,6 +18,7 @@ import typer
 
 from rcsa_ident.base.errors import InputError, RcsaIdentError, no_cache
 from rcsa_ident.io.unread_columns import left_aside, reading_tables
+from rcsa_ident.setup.fields import COEFFICIENTS
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn, TaskID
@@ -40,11 +41,8 @@ _OPTIONS = {
     "holder length": ("length_mm", ""),
     "tangential coefficient": ("ktc_mpa", ""),
     "radial ratio": ("krc", ""),
-    "radial_ratio": ("krc", ""),
-    "axial_ratio": ("kac", ""),
+    **{each.name: (each.key, "") for each in COEFFICIENTS},
     "y_from and y_to": ("y_from_mm", ""),
-    "tangential_edge": ("kte_n_per_mm", ""),
-    "radial_edge": ("kre_n_per_mm", ""),
     "runout": ("runout_um", "in um"),
     "feed_per_tooth": ("feed_per_tooth_mm", ""),
     "quantity": ("quantity", ""),

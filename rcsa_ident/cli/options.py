@@ -58,6 +58,16 @@ def takes_groups(command: Callable[..., Any]) -> Callable[..., Any]:
     return spread
 
 
+_KEYS = {each.key: each for each in ASKED_CUT}
+_CALLED = {key: f"--{key.replace('_', '-')}" for key in _KEYS}
+
+
+def option(key: str, panel: str | None = None, metavar: str | None = None) -> Any:
+    """Return the option for a declared key of a cut."""
+    field = _KEYS[key]
+    return typer.Option(help=field.help.format_map(_CALLED), metavar=metavar, show_default=field.default is not None, rich_help_panel=panel)
+
+
 class KeyOptions:
     """A group made of declared keys: an option for each, which a class may type otherwise than files and bodies do."""
 
@@ -68,15 +78,12 @@ class KeyOptions:
         def __getattr__(self, key: str) -> Any: ...
 
     def __init_subclass__(cls, fields: Sequence[Field], panel: str, metavars: Mapping[str, str]) -> None:
-        typed, called = get_type_hints(cls), {each.key: f"--{each.key.replace('_', '-')}" for each in fields}
-        cls.__annotations__ = {}
+        typed, cls.__annotations__ = get_type_hints(cls), {}
         for each in fields:
             default = getattr(cls, each.key, each.default)
             kind = typed.get(each.key, float if isinstance(each.kind, Range | Number) else str)
-            option = typer.Option(
-                help=each.help.format_map(called), metavar=metavars.get(each.key), show_default=default is not None, rich_help_panel=panel
-            )
-            cls.__annotations__[each.key] = Annotated[kind if default is not None else kind | None, option]
+            told = option(each.key, panel, metavars.get(each.key))
+            cls.__annotations__[each.key] = Annotated[kind if default is not None else kind | None, told]
             setattr(cls, each.key, default)
         dataclass(frozen=True)(cls)
 

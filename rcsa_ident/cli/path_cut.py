@@ -15,9 +15,10 @@ from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import subjects_of
 from rcsa_ident.cli.lobes import check_plot
-from rcsa_ident.cli.options import TipOptions, takes_groups
+from rcsa_ident.cli.options import TipOptions, option, takes_groups
 from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
 from rcsa_ident.cli.robot import is_robot, posed_robot
+from rcsa_ident.setup.fields import COEFFICIENTS, told_in_si
 from rcsa_ident.stability.methods import MethodName
 
 if TYPE_CHECKING:
@@ -49,12 +50,10 @@ class PathCutOptions:
         typer.Option(metavar="'Q1 Q2 ...'", help="Of a robot: angles near those of the first place, degrees.", show_default=False),
     ] = None
     speed_rpm: Annotated[float | None, typer.Option(help="Spindle speed, rev/min, where the path has none.", show_default=False)] = None
-    material: Annotated[str | None, typer.Option(help="Coefficients of a material of the library.", show_default=False)] = None
-    ktc_mpa: Annotated[
-        float | None, typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False)
-    ] = None
-    krc: Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)] = None
-    kac: Annotated[float | None, typer.Option(help="Axial ratio; default: the result's workpiece, or 0.", show_default=False)] = None
+    material: Annotated[str | None, option("material")] = None
+    ktc_mpa: Annotated[float | None, option("ktc_mpa")] = None
+    krc: Annotated[float | None, option("krc")] = None
+    kac: Annotated[float | None, option("kac")] = None
     cell_mm: CellMm = None
 
 
@@ -184,10 +183,8 @@ def _change(machine: TipSource, tooling: Tooling, cut: PathCutOptions, method: M
     from rcsa_ident.stability.lobes import DRAWS, METHODS
     from rcsa_ident.workflows.tool_change import ToolChange
 
-    given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}
-    given |= {} if cut.krc is None else {"radial_ratio": cut.krc}
-    given |= {} if cut.kac is None else {"axial_ratio": cut.kac}
     speeds = np.zeros(0) if cut.speed_rpm is None else np.array([from_rpm(positive("--speed-rpm", cut.speed_rpm, "rev/min"))])
+    given = told_in_si(COEFFICIENTS, {"ktc_mpa": cut.ktc_mpa, "krc": cut.krc, "kac": cut.kac})
     spec = CutSpec(material=cut.material, coefficients=given)
     # every move has a depth of its own: nothing is asked about the largest one
     change = ToolChange(machine, tooling, spec, speeds, 1.0, METHODS[method](), DRAWS if bands else 0)

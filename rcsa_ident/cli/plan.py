@@ -14,7 +14,7 @@ from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import engagement, feed_angle
-from rcsa_ident.cli.options import Strategy
+from rcsa_ident.cli.options import Strategy, option
 
 if TYPE_CHECKING:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -56,12 +56,10 @@ def plan(
         float | None, typer.Option(help="Lowest spindle speed, rev/min; default: the campaign's.", show_default=False)
     ] = None,
     speed_to: Annotated[float | None, typer.Option(help="Highest spindle speed; default: the campaign's.", show_default=False)] = None,
-    immersion: Annotated[str, typer.Option(help="Radial depth over diameter, as 0.5 or 50%; 1 is a slot.")] = "0.5",
-    strategy: Annotated[Strategy, typer.Option(help="Up or down milling.")] = Strategy.down,
-    entry_deg: Annotated[
-        float | None, typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False)
-    ] = None,
-    exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False)] = None,
+    immersion: Annotated[str, option("immersion")] = "0.5",
+    strategy: Annotated[Strategy, option("strategy")] = Strategy.down,
+    entry_deg: Annotated[float | None, option("entry_deg")] = None,
+    exit_deg: Annotated[float | None, option("exit_deg")] = None,
     feed_direction: Annotated[
         str | None,
         typer.Option(

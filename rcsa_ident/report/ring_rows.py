@@ -7,14 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rcsa_ident.base.plausibility import CONTACT
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.identification.ring.ringing import UNKNOWNS, RungLine, RungTooling
 from rcsa_ident.tool_holder.alteration import fluted_segments
-
-_CONTACT = {
-    "translational_stiffness": "N/m per m", "rotational_stiffness": "N m/rad per m", "translational_damping": "N s/m per m",
-    "rotational_damping": "N m s/rad per m",
-}  # fmt: skip
 
 
 class Change(NamedTuple):
@@ -66,10 +62,10 @@ def _changes(found: RungTooling) -> Iterator[Change]:
     moduli = 1e-9 * old_material.youngs_modulus, 1e-9 * new_material.youngs_modulus
     yield change("Young's modulus", "materials.youngs_modulus_gpa", "youngs_modulus", *moduli, "GPa")
     yield change("density", "materials.density", "density", old_material.density, new_material.density, "kg/m³")
-    for name, unit in _CONTACT.items():
+    for name, kind in CONTACT.items():
         if before.contact is not None and after.contact is not None:
             told = getattr(before.contact, name), getattr(after.contact, name)
-            yield change(f"contact's {name.replace('_', ' ')}", f"contact.{name}", name, *told, unit)
+            yield change(f"contact's {name.replace('_', ' ')}", f"contact.{name}", name, *told, kind.unit)
     diameters = 1e3 * before.holder[0].diameter, 1e3 * after.holder[0].diameter
     yield change("holder's diameter", "holder.segments[0].outer_diameter_mm", "holder_diameter", *diameters, "mm")
 

@@ -119,6 +119,12 @@ class Field:
         number = self.number
         return value * number.size if isinstance(number, Range) or number.per == 1.0 else value / number.per
 
+    def in_unit(self, value: Any) -> Any:
+        """Return a number of the noun as the key has it; what is none stays."""
+        if value is None or not isinstance(self.kind, Range | Number):
+            return value
+        return value * (1.0 / self.kind.size) if isinstance(self.kind, Range) or self.kind.per == 1.0 else value * self.kind.per
+
     @property
     def limits(self) -> tuple[float | None, float | None, float | None]:
         """Least and most number [unit], and that which it lies above."""
@@ -152,6 +158,12 @@ def keys_of(fields: Iterable[Field]) -> tuple[str, ...]:
 def told_in_si(fields: Iterable[Field], keys: Mapping[str, Any]) -> dict[str, Any]:
     """Return what is told of a noun, by the names of its fields."""
     return {each.name: each.in_si(keys[each.key]) for each in fields if keys.get(each.key) is not None}
+
+
+def keys_told(fields: Iterable[Field], noun: object, usual: bool = True) -> dict[str, Any]:
+    """Return what a noun says, by its keys; without `usual` not what counts where a key is left out."""
+    told = ((each, getattr(noun, each.name)) for each in fields)
+    return {each.key: each.in_unit(value) for each, value in told if usual or each.default is NEEDED or value != each.in_si(each.default)}
 
 
 _ANGLE, _LEAN = Number("deg", _DEGREE, 0.0, 180.0), Number("deg", _DEGREE, -89.0, 89.0)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import CONTACT
 from rcsa_ident.base.units import to_hz, to_rpm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines
@@ -45,13 +46,7 @@ _WORDS = {
     "fluted_diameter": ("fluted diameter", "mm"),
     "youngs_modulus": ("Young's modulus of the tool", "GPa"),
     "holder_diameter": ("holder diameter at its front", "mm"),
-}
-#: Per metre of insertion, as in the file.
-_CONTACT_UNITS = {
-    "translational_stiffness": "N/m per m",
-    "rotational_stiffness": "N m/rad per m",
-    "translational_damping": "N s/m per m",
-    "rotational_damping": "N m s/rad per m",
+    **{name: (f"{name.replace('_', ' ')} of the contact", kind.unit) for name, kind in CONTACT.items()},
 }
 
 
@@ -270,7 +265,7 @@ def _row(learnt: LearntTooling, field: str) -> Learnt:
         }
         return sizes[field] if field in sizes else float(getattr(assembly.contact, field))
 
-    what, unit = _WORDS.get(field, (f"{field.replace('_', ' ')} of the contact", _CONTACT_UNITS.get(field, "")))
+    what, unit = _WORDS[field]
     before, after, was, is_ = getattr(learnt.before, field), getattr(learnt.deviation, field), value(drawn), value(found)
     # lengths have a deviation in metres, all else one of its logarithm
     return Learnt(

@@ -190,8 +190,6 @@ def broken(**changed):
         ({"sensors__flange_x__sensitivity": 0.0}, "sensors.flange_x.sensitivity"),
         ({"sensors__flange_x__axis": None}, "sensors.flange_x.axis"),
         ({"sensors": {f"s{k}": {"quantity": "trigger"} for k in range(65)}}, "sensors"),
-        ({"workpiece__tangential_coefficient_mpa": 1e9}, "workpiece.tangential_coefficient_mpa"),
-        ({"campaign__sampling_rate_hz": 0.0}, "campaign.sampling_rate_hz"),
         ({"toolings__T1__tool__stickout_mm": 0.0}, "tool.stickout_mm"),
         ({"toolings": {f"T{k}": "T1" for k in range(201)}}, "toolings"),
     ],

@@ -345,8 +345,6 @@ def test_advice_stands_by_the_lobes(shop):
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ({"cut": {"immersion": 0}}, "cut.immersion"),
-        ({"cut": {"immersion": 1.5}}, "cut.immersion"),
         ({"cut": {"entry_deg": 90}}, "cut.exit_deg"),
         ({"cut": {"entry_deg": 90, "exit_deg": 90}}, "cut.exit_deg"),
         ({"cut": {"stock": "block"}}, "cut.y_from_mm"),

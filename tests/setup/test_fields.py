@@ -38,6 +38,7 @@ from rcsa_ident.setup.fields import (
     Field,
     Many,
     Number,
+    keys_told,
     told_in_si,
 )
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Role, Sensor
@@ -78,6 +79,22 @@ def test_declarations_cost_a_command_nothing():
 
 def test_what_is_not_told_is_left_to_the_noun():
     assert told_in_si(COEFFICIENTS, {"ktc_mpa": 900.0, "krc": None, "odd": 1}) == {"tangential": 900.0 * 1e6}
+
+
+@pytest.mark.parametrize(
+    ("noun", "fields"),
+    [
+        (Spread(stickout=0.25e-3, contact_stiffness=0.5), SPREAD),
+        (Contact(2e10, 6e5, 0.0, 9.0), CONTACT),
+        (Material(5.8e11, 14400.0, 0.22), MATERIAL),
+        (BeamSegment(0.02, 0.01, Material(5.8e11, 14400.0, 0.22), end_diameter=0.0125), SEGMENT),
+    ],
+    ids=lambda each: type(each).__name__,
+)
+def test_a_noun_is_made_again_of_the_keys_that_it_tells(noun, fields):
+    every, unusual = keys_told(fields, noun), keys_told(fields, noun, usual=False)
+    assert unusual.items() < every.items()
+    assert type(noun)(**told_in_si(fields, every)) == type(noun)(**told_in_si(fields, unusual)) == noun
 
 
 def test_every_key_of_a_cut_is_an_option_with_its_words():

@@ -1,6 +1,6 @@
 // Fields with their labels, hints and faults, and problem documents put beside the fields that they name.
 import { h, note, tell } from "./dom.js";
-import { quantityInput, u } from "./units.js";
+import { kindOf, quantityInput, u } from "./units.js";
 
 let count = 0;
 
@@ -26,7 +26,11 @@ export function quantity(label, kind, value, options = {}) {
   return box;
 }
 
-/** A choice from a list of [value, words]. */
+/** A quantity of a declared key of a noun. */
+export const declaredField = ({ key, label, unit, hint }, noun, value, props = {}) =>
+  quantity(label, kindOf(unit), value ?? null, { name: `${noun}.${key}`, hint, props });
+
+/** A choice from a list of [value, words]: the first one where none of them is chosen. */
 export function select(options, chosen, props = {}) {
   return h(
     "select",

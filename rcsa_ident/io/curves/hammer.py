@@ -11,6 +11,7 @@ import tomlkit
 from tomlkit.items import InlineTable, Table
 
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import CONTACT
 from rcsa_ident.dynamics.passivity import judged
 from rcsa_ident.dynamics.receptance import MeasuredCurve
 from rcsa_ident.io.curves.frf_files import read_frfs
@@ -91,17 +92,11 @@ def write_calibrated_tooling(
         translation and rotation, and the larger one is honest. A file that states nothing of the rest goes on to count as exact there.
     `remarks`: written above it as comments
     """
-    values = {
-        "translational_stiffness": ("N/m per m", contact.translational_stiffness),
-        "rotational_stiffness": ("N m/rad per m", contact.rotational_stiffness),
-        "translational_damping": ("N s/m per m", contact.translational_damping),
-        "rotational_damping": ("N m s/rad per m", contact.rotational_damping),
-    }
     table = tomlkit.table()
     for remark in remarks:
         table.add(tomlkit.comment(one_line(remark)))
-    for key, (unit, value) in values.items():
-        table.add(key, tomlkit.item(float(f"{value:.8g}")).comment(unit))
+    for key, kind in CONTACT.items():
+        table.add(key, tomlkit.item(float(f"{getattr(contact, key):.8g}")).comment(kind.unit))
     read_tooling(source)  # what is no tooling is refused before it is touched
     document = tomlkit.parse(read_bytes(source, "tooling", LARGEST_SETUP).decode("utf-8-sig"))
     before = document.get("contact")

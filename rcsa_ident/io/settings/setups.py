@@ -18,7 +18,7 @@ from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.setup.campaign import Campaign
-from rcsa_ident.setup.fields import CAMPAIGN, CONTACT, MATERIAL, SEGMENT, SENSOR, SPREAD, keys_of, told_in_si
+from rcsa_ident.setup.fields import CAMPAIGN, CONTACT, MATERIAL, SEGMENT, SENSOR, SPREAD, keys_of, keys_told, told_in_si
 from rcsa_ident.setup.tooling import BareCutter, Tooling
 from rcsa_ident.signals.motion import measured_axes, motion_channels, workpiece_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
@@ -100,26 +100,16 @@ def spread_of(table: Table, contact: Contact | None = None) -> Spread:
     """Return how well a drawing is known; what the table leaves out is what an honest drawing, or the catalogue's contact, is good for."""
     assumed = assumed_contact(contact)
     honest = Spread() if assumed is None else assumed.spread
-    return Spread(**told_in_si(SPREAD, table.fields(SPREAD, spread_keys(honest))))
-
-
-def spread_keys(spread: Spread) -> dict[str, float]:
-    """Return how well a drawing is known as `spread` of a tooling file, in percent and millimetres."""
-    return {each.key: getattr(spread, each.name) / each.number.size for each in SPREAD}
+    return Spread(**told_in_si(SPREAD, table.fields(SPREAD, keys_told(SPREAD, honest))))
 
 
 def material_library(top: Table) -> dict[str, Material]:
     """The built-in library, and the file's own over it; a known material may change single values."""
     materials = dict(MATERIALS)
     for name, table in top.named_tables("materials", keys_of(MATERIAL), {}).items():
-        known = material_keys(MATERIALS[name]) if name in MATERIALS else {}
+        known = keys_told(MATERIAL, MATERIALS[name]) if name in MATERIALS else {}
         materials[name] = Material(**told_in_si(MATERIAL, table.fields(MATERIAL, known)))
     return materials
-
-
-def material_keys(material: Material) -> dict[str, float]:
-    """Return a material as a table of ``[materials]``."""
-    return {each.key: getattr(material, each.name) * (1.0 / each.number.size) for each in MATERIAL}
 
 
 def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamSegment, ...]:

@@ -26,9 +26,10 @@ from rcsa_ident.io.settings.hsm_libraries import hsm_entries, is_xml
 from rcsa_ident.io.settings.library_entries import plain_entry, preset_notes
 from rcsa_ident.io.settings.library_shapes import NotRead, check_type, iso_geometry, iso_shape_keys, shape_keys
 from rcsa_ident.io.settings.setups import tooling_of
-from rcsa_ident.io.settings.toolings import contact_keys, contact_spread_keys, tooling_text
+from rcsa_ident.io.settings.toolings import contact_spread_keys, tooling_text
 from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.io.validated_table import Table, listed
+from rcsa_ident.setup.fields import CONTACT, keys_told
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.catalogue import typical_contact
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
@@ -282,7 +283,7 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
         )
     else:
         notes.append("contact taken from another tooling")
-    data["contact"] = contact_keys(contact)
+    data["contact"] = keys_told(CONTACT, contact)
     # without a word on it the reader knows what is usual, and of an assumed contact what the catalogue states
     data["spread"] = contact_spread_keys(spread) if spread is not None and spread.stated else {}
     return data, notes

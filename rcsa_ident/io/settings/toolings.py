@@ -9,14 +9,15 @@ from typing import Any
 
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.settings.cutters import cutter_keys
-from rcsa_ident.io.settings.setups import material_keys, spread_keys
 from rcsa_ident.io.toml_text import toml_of
-from rcsa_ident.setup.fields import CONTACT, keys_of
+from rcsa_ident.setup.fields import CONTACT, MATERIAL, SEGMENT, SPREAD, keys_told
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
-from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Material
 from rcsa_ident.tool_holder.spread import Spread
 
+#: As files have it: the end in front of the bore.
+_SEGMENT = (*SEGMENT[:2], SEGMENT[3], SEGMENT[2], *SEGMENT[4:])
 CONTACT_SPREADS = ("contact_stiffness_percent", "contact_damping_percent")
 
 
@@ -40,16 +41,16 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
         "holder": {"insertion_mm": 1e3 * assembly.insertion, "segments": [_segment(s, names) for s in assembly.holder]},
     }
     if assembly.contact is not None:
-        data["contact"] = contact_keys(assembly.contact)
+        data["contact"] = keys_told(CONTACT, assembly.contact)
     for part, model in (("tool", tooling.tool_model), ("holder", tooling.holder_model)):
         if model:
             data[part]["model"] = model
     if tooling.taper:
         data["holder"]["taper"] = tooling.taper
     if tooling.spread.stated:
-        data["spread"] = spread_keys(tooling.spread)
+        data["spread"] = keys_told(SPREAD, tooling.spread)
     own = {name: material for name, material in materials.items() if name not in MATERIALS}
-    return data | ({"materials": {name: material_keys(material) for name, material in own.items()}} if own else {})
+    return data | ({"materials": {name: keys_told(MATERIAL, material) for name, material in own.items()}} if own else {})
 
 
 def _joined(tooling: Tooling) -> list[BeamSegment]:
@@ -72,15 +73,10 @@ def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:
     return {"insertion_mm": 1e3 * holder.insertion, "segments": [_segment(s, names) for s in holder.segments]}
 
 
-def contact_keys(contact: Contact) -> dict[str, float]:
-    """Return a contact as `contact` of a tooling file, per metre of insertion in SI units."""
-    return {key: getattr(contact, key) for key in keys_of(CONTACT)}
-
-
 def contact_spread_keys(spread: Spread) -> dict[str, float]:
     """Return what `spread` of a tooling file states of the contact alone, so that the rest counts as drawings usually do."""
     # a share and back leaves a last digit that nobody stated
-    return {key: round(spread_keys(spread)[key], 9) for key in CONTACT_SPREADS}
+    return {key: round(keys_told(SPREAD, spread)[key], 9) for key in CONTACT_SPREADS}
 
 
 def typical_contact_keys(typical: TypicalContact | None) -> dict[str, Any] | None:
@@ -89,7 +85,7 @@ def typical_contact_keys(typical: TypicalContact | None) -> dict[str, Any] | Non
         return None
     return {
         "kind": typical.kind,
-        "keys": contact_keys(typical.contact),
+        "keys": keys_told(CONTACT, typical.contact),
         "stiffness_spread_percent": 100.0 * typical.stiffness_spread,
         "damping_spread_percent": 100.0 * typical.damping_spread,
         "source": typical.source,
@@ -103,12 +99,4 @@ def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
 
 
 def _segment(segment: BeamSegment, names: Mapping[Material, str]) -> dict[str, Any]:
-    found: dict[str, Any] = {"length_mm": 1e3 * segment.length, "outer_diameter_mm": 1e3 * segment.diameter}
-    if segment.end_diameter is not None:
-        found["end_diameter_mm"] = 1e3 * segment.end_diameter
-    if segment.inner_diameter:
-        found["inner_diameter_mm"] = 1e3 * segment.inner_diameter
-    found["material"] = names[segment.material]
-    if segment.area is not None and segment.second_moment is not None:
-        found |= {"area_mm2": 1e6 * segment.area, "second_moment_mm4": 1e12 * segment.second_moment}
-    return found
+    return keys_told(_SEGMENT, segment, usual=False) | {"material": names[segment.material]}

@@ -124,7 +124,6 @@ BROKEN = [
     ({"helix_deg": 85.0}, "helix_deg", "at most 80 [deg]"),
     ({"helix_kind": "steep"}, "helix_kind", "one of lead, angle"),
     ({"runout_mm": [0.01]}, "runout_mm", "a list of 4 finite numbers"),
-    ({"tilt_deg": 5.0}, "tilt_deg", "at most 1"),
     ({"serration": {"amplitude_mm": 0.2}}, "serration.wavelength_mm", "above 0"),
     ({"serration": {"amplitude_mm": 2.0, "wavelength_mm": 1.0}}, "serration", "an amplitude below the wavelength"),
     ({"serration": {"amplitude_mm": 0.2, "wavelength_mm": 1.0, "wave": 1}}, "serration.wave", "one of amplitude_mm, wavelength_mm"),

@@ -2,7 +2,9 @@
 
 import copy
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import jsonschema_rs
 import pytest
@@ -10,6 +12,7 @@ import rtoml
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.schemas import _FILES, DIALECT, SCHEMAS, schema_of, schema_text
+from rcsa_ident.setup.fields import NOUNS
 from tests.fixtures.paths import ROOT
 
 #: What hangs on another key of the file, or asks for one more key or entry: only a reader knows it.
@@ -148,3 +151,36 @@ def test_sizes_that_hang_on_teeth_and_tools_are_left_to_the_reader():
             {"enum": ["tip", "flange"]},
             {"type": "number", "minimum": 0.0, "description": "In mm"},
         ]
+
+
+#: Where files have the keys of a noun.
+_OF_NOUNS = {
+    "cutter": "tooling cutter", "segment": "tooling tool segments", "contact": "tooling contact", "material": "tooling materials",
+    "spread": "tooling spread", "workpiece": "campaign workpiece", "sensor": "campaign sensors", "campaign": "campaign campaign",
+    "cuts": "campaign cuts", "frfs": "campaign frfs",
+}  # fmt: skip
+
+
+def _tables(schema: dict[str, Any], *way: str) -> Iterator[dict[str, Any]]:
+    """Keys of the tables at the end of a way."""
+    if "anyOf" in schema:
+        for each in schema["anyOf"]:
+            yield from _tables(each, *way)
+    elif inner := schema.get("additionalProperties") or schema.get("items"):
+        yield from _tables(inner, *way)
+    elif way:
+        yield from _tables(schema["properties"][way[0]], *way[1:])
+    else:
+        yield schema["properties"]
+
+
+@pytest.mark.parametrize("noun", _OF_NOUNS)
+def test_a_reader_asks_for_every_declared_key_and_holds_it_to_its_limits(noun):
+    name, *way = _OF_NOUNS[noun].split()
+    places = list(_tables(schema_of(name), *way))
+    for field in NOUNS[noun]:
+        found = [keys[field.key] for keys in places if field.key in keys]
+        assert found
+        for asked in found if field.kind is not list else []:
+            number = next((each for each in asked.get("anyOf", []) if each.get("type") == "number"), asked)
+            assert tuple(number.get(word) for word in ("minimum", "maximum", "exclusiveMinimum")) == field.limits

@@ -126,26 +126,21 @@ BROKEN_TOOLINGS = [
     ("teeth = 4", "teeth = 4.5", ["cutter.teeth", "found 4.5", "a whole number"]),
     ("teeth = 4", "teeth = true", ["cutter.teeth", "found true"]),
     ("teeth = 4", "theeth = 4", ["cutter.theeth", "an unknown key", "did you mean teeth?"]),
-    ("diameter_mm = 12.0", "diameter_mm = 0", ["cutter.diameter_mm", "found 0", "at least 0.05", "[mm]"]),
     ("diameter_mm = 12.0", "diameter_mm = nan", ["cutter.diameter_mm", "found nan", "a finite number"]),
     ("diameter_mm = 12.0", "diameter_mm = inf", ["cutter.diameter_mm", "found inf"]),
     ("diameter_mm = 12.0", f"diameter_mm = 1{'0' * 400}", ["line 4, column 15", "integer number overflowed"]),
     ("diameter_mm = 12.0", 'diameter_mm = "12"', ["cutter.diameter_mm", 'the text "12"', "a finite number"]),
     ("diameter_mm = 12.0", "diameter_mm = 2026-11-01", ["cutter.diameter_mm", "date 2026-11-01"]),
-    ("helix_deg = 30.0", "helix_deg = 89", ["cutter.helix_deg", "at most 80 [deg]"]),
     ("[90, 90, 90, 90]", "[90, 90, 90]", ["cutter.pitch_deg", "a list of 3", "a list of 4 finite numbers"]),
     ("[90, 90, 90, 90]", "[90, 90, 90, 80]", ["cutter.pitch_deg", "sum 350", "add up to 360"]),
     ("[90, 90, 90, 90]", '[90, 90, 90, "90"]', ["cutter.pitch_deg", 'the text "90" in the list']),
     ("teeth = 4", 'teeth = 4\nshape = "bal"', ["cutter.shape", '"bal"', "one of flat, bull-nose, ball", "did you mean ball?"]),
     ("teeth = 4", "teeth = 4\nshape = 3", ["cutter.shape", "found 3", "one of flat"]),
-    ("teeth = 4", "teeth = 4\ncorner_radius_mm = 6.5", ["cutter.corner_radius_mm", "found 6.5", "at most half of the diameter, 6 [mm]"]),
-    ("teeth = 4", "teeth = 4\ncorner_radius_mm = -1", ["cutter.corner_radius_mm", "found -1", "at least 0"]),
     ("[cutter]", "[cutters]", ["cutters", "an unknown key", "did you mean cutter?"]),
     ("stickout_mm = 70.5", "stickout = 70.5", ["tool.stickout", "did you mean stickout_mm?"]),
     ("stickout_mm = 70.5", "stickout_mm = 80", ["tool.stickout_mm + holder.insertion_mm", "120 mm", "the tool's length, 110.5 mm"]),
     ("insertion_mm = 40.0", "insertion_mm = 41\n", ["tool.stickout_mm + holder.insertion_mm", "111.5 mm"]),
     ("{ length_mm = 40.0", "{ length_mm = 39.0", ["holder.insertion_mm", "found 40 mm", "the holder's length, 39 mm"]),
-    ("length_mm = 84.5", "length_mm = -84.5", ["tool.segments[1].length_mm", "found -84.5", "above 0"]),
     ("outer_diameter_mm = 9.6, ", "", ["tool.segments[0].outer_diameter_mm", "found nothing"]),
     ("inner_diameter_mm = 0.0", "inner_diameter_mm = 9.6", ["tool.segments[0].inner_diameter_mm", "below the outer diameter, 9.6"]),
     (CARBIDE, '12.0, material = "carbid"', ["tool.segments[1].material", '"carbid"', "did you mean carbide?"]),
@@ -156,10 +151,6 @@ BROKEN_TOOLINGS = [
         '"steel" } ]', '"steel" } ]\n[holder.segment]', ["holder.segment", "an unknown key", "did you mean segments?"],
     ),
     ("translational_stiffness = 2.0e10", "", ["contact.translational_stiffness", "found nothing", "N/m per m"]),
-    ("rotational_damping = 9.0", "rotational_damping = -9.0", ["contact.rotational_damping", "at least 0"]),
-    ("gpa = 600.0", "gpa = 600e9", ["materials.carbide.youngs_modulus_gpa", "at most 2000 [GPa]"]),
-    ("density = 14400.0", "density = 14.4", ["materials.carbide.density", "at least 100", "[kg/m^3]"]),
-    ("poisson = 0.22", "poisson = 0.5", ["materials.carbide.poisson", "at most 0.499"]),
     ("[materials.carbide]", "[materials]\ncarbide = 600\n[extra]", ["extra", "an unknown key"]),
     ('name = "S1-ER32"', "name = 1", ["name", "found 1", "a text"]),
     ('name = "S1-ER32"', 'name = " "', ["name", "an empty text"]),
@@ -243,7 +234,6 @@ def test_campaign_without_head(campaign, campaign_text):
 BROKEN_CAMPAIGNS = [
     ("[campaign]", "[campaign", ["line 1", "a TOML error"]),
     ("[campaign]", "[campagne]", ["campagne", "an unknown key", "did you mean campaign?"]),
-    ("sampling_rate_hz = 51200.0", "sampling_rate_hz = 0", ["campaign.sampling_rate_hz", "above 0", "[Hz]"]),
     ("sampling_rate_hz", "sample_rate_hz", ["campaign.sample_rate_hz", "did you mean sampling_rate_hz?"]),
     ('"displacement"', '"displacment"', ["sensors.flange_x.quantity", '"displacment"', "did you mean displacement?"]),
     ('"displacement"\naxis = "X"', '"displacement"', ["sensors.flange_x.axis", "found nothing", "one of X, Y"]),
@@ -252,12 +242,8 @@ BROKEN_CAMPAIGNS = [
     ("sensitivity = 10.0e3", "sensitivity = 0", ["sensors.flange_x.sensitivity", "found 0", "other than 0"]),
     ("sensitivity = 10.0e3", "", ["sensors.flange_x.sensitivity", "found nothing"]),
     ("sensitivity = 10.0e3", "sensitivity = 1e4\ntooth_angle_deg = 0", ["sensors.flange_x.tooth_angle_deg", "an unknown key"]),
-    ("bandwidth_hz = 1.0e4", "bandwidth_hz = -1", ["sensors.fixture_x.bandwidth_hz", "above 0"]),
     ("delay_s = 1.0e-5", "delay_us = 10", ["sensors.fixture_x.delay_us", "did you mean delay_s?"]),
-    ("pulses_per_revolution = 1", "pulses_per_revolution = 0", ["sensors.trigger.pulses_per_revolution", "a whole number"]),
     ('[workpiece]\nname = "EN AW-6082"', "[workpiece]", ["workpiece.name", "found nothing"]),
-    ("tangential_coefficient_mpa = 902.0", "tangential_coefficient_mpa = 902e6", ["workpiece.tangential_coefficient_mpa", "[MPa]"]),
-    ("radial_ratio = 0.26", "radial_ratio = 26", ["workpiece.radial_ratio", "at most 5"]),
     ('"toolings/S1-ER32.toml"', '"toolings/S2.toml"', ["toolings.S1-ER32", '"toolings/S2.toml"', "which does not exist"]),
     ('"toolings/S1-ER32.toml"', '"../S1.toml"', ["toolings.S1-ER32", "'../S1.toml'", "inside the campaign's folder"]),
     ('"toolings/S1-ER32.toml"', "3", ["toolings.S1-ER32", "found 3", "a path"]),
@@ -271,13 +257,9 @@ BROKEN_CAMPAIGNS = [
     ('"recordings/S1-ER32_00_air.h5"', '"recordings/../../x.h5"', ["cuts[0].air", "without .."]),
     ('id = "S1-ER32-01"', 'id = "S1-ER32-00"', ["cuts[1].id", "the id of cuts[0]", "an id of its own"]),
     ('tooling = "S1-ER32"', 'tooling = "S1-ER23"', ["cuts[0].tooling", '"S1-ER23"', "did you mean S1-ER32?"]),
-    ("spindle_speed_rpm = 8300.0", "spindle_speed_rpm = -1", ["cuts[1].spindle_speed_rpm", "at least 1", "[rev/min]"]),
     ("axial_depth_mm = 0.4", "axial_depth = 0.4", ["cuts[0].axial_depth", "did you mean axial_depth_mm?"]),
-    ("feed_per_tooth_mm = 0.1", "feed_per_tooth_mm = 100", ["cuts[0].feed_per_tooth_mm", "at most 10 [mm]"]),
     ("exit_angle_deg = 180.0", "exit_angle_deg = 90", ["cuts[0].exit_angle_deg", "found 90", "above entry_angle_deg, 90"]),
-    ("entry_angle_deg = 90.0", "entry_angle_deg = -5", ["cuts[0].entry_angle_deg", "at least 0"]),
     ('feed_direction = "+X"', 'feed_direction = "X"', ["cuts[0].feed_direction", '"X"', "one of +X, -X, +Y, -Y"]),
-    ('feed_direction = "+X"', "feed_direction = 400", ["cuts[0].feed_direction", "found 400", "from -360 to 360"]),
     ('feed_direction = "+X"', "", ["cuts[0].feed_direction", "found nothing"]),
     ("[[cuts]]", "[[cut]]", ["cut", "an unknown key", "did you mean cuts?"]),
 ]  # fmt: skip
@@ -356,9 +338,6 @@ def test_a_sensor_that_is_turned_needs_its_neighbour(campaign, campaign_text):
     path.write_text(alone)
     with pytest.raises(InputError, match=r"flange_x.rotation_deg: found -1.5, allowed is 0, or as many sensors along the other axis"):
         read_campaign(campaign)
-    path.write_text(told.replace("-1.5", "200.0"))
-    with pytest.raises(InputError, match="rotation_deg"):
-        read_campaign(campaign)
 
 
 def test_how_far_behind_the_flange_a_sensor_looks(campaign, campaign_text):
@@ -373,16 +352,6 @@ def test_how_far_behind_the_flange_a_sensor_looks(campaign, campaign_text):
     assert gap("distance_behind_flange_mm = 12.5") == pytest.approx((0.0125, 1e-3))
     assert gap("distance_behind_flange_mm = -8.0", "distance_spread_mm = 0.2") == pytest.approx((-0.008, 2e-4))
     assert gap("distance_behind_flange_mm = 0.0", "distance_spread_mm = 0.0") == (0.0, 0.0)
-    for key, value in (
-        ("distance_behind_flange_mm", "301.0"),
-        ("distance_behind_flange_mm", "-101.0"),
-        ("distance_behind_flange_mm", "nan"),
-        ("distance_behind_flange_mm", '"12"'),
-        ("distance_spread_mm", "-1.0"),
-        ("distance_spread_mm", "101.0"),
-    ):
-        with pytest.raises(InputError, match=rf"sensors\.flange_x\.{key}"):
-            gap(f"{key} = {value}")
 
 
 @pytest.mark.parametrize("key", ["distance_behind_flange_mm", "distance_spread_mm"])

@@ -7,6 +7,7 @@ import { go, holdsEdits, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { quantityInput, u } from "../units.js";
 import { queueFor } from "../uploads.js";
+import { DIRECTIONS, STRATEGIES } from "./change_question.js";
 import { targetMachine } from "./target_machine.js";
 
 const SENSOR = [["Channel"], ["Measures"], ["Axis"], ["Sensitivity"], ["Behind the flange", "depth"]];
@@ -70,17 +71,8 @@ export async function view(_args, _query, place) {
     depth: quantity("Axial depth", "depth", 0.4, { name: "axial_depth_mm" }),
     feed: quantity("Feed per tooth", "feed", 0.1, { name: "feed_per_tooth_mm" }),
     immersion: quantity("Radial immersion", "percent", 50),
-    strategy: select(
-      [
-        ["down", "Down milling"],
-        ["up", "Up milling"],
-      ],
-      "down",
-    ),
-    direction: select(
-      ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]),
-      "+X",
-    ),
+    strategy: select(STRATEGIES, "down"),
+    direction: select(DIRECTIONS, "+X"),
   };
   const first = quantity("First speed", "speed", null, { hint: "Fills the speeds below" });
   const step = quantity("Step", "speed", null);
@@ -243,22 +235,8 @@ function told(inputs) {
 function sensorRow(channel, kind, axis) {
   const inputs = {
     channel: h("input", { "aria-label": "Channel", autocomplete: "off" }),
-    kind: select(
-      [
-        ["displacement", "displacement"],
-        ["acceleration", "acceleration"],
-      ],
-      kind,
-      { "aria-label": "Measures" },
-    ),
-    axis: select(
-      [
-        ["X", "X"],
-        ["Y", "Y"],
-      ],
-      axis,
-      { "aria-label": "Axis" },
-    ),
+    kind: select(["displacement", "acceleration"].map((each) => [each, each]), kind, { "aria-label": "Measures" }),
+    axis: select(["X", "Y"].map((each) => [each, each]), axis, { "aria-label": "Axis" }),
     sensitivity: quantityInput("none", 1, { "aria-label": "Sensitivity" }),
     distance: quantityInput("depth", null, { "aria-label": "Behind the flange" }),
   };

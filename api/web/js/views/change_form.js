@@ -1,9 +1,9 @@
 // The form of a tool change: toolings, cut, speeds, and what is asked more rarely; an address fills it.
 import { h, fill } from "../dom.js";
-import { field, quantity, select } from "../forms.js";
+import { field, select } from "../forms.js";
 import { asAddress, fromAddress } from "../tested.js";
 import { plain, q, quantityListInput, text, unit } from "../units.js";
-import { bodyOf, checked, NUMBERS, QUICK, runoutOf } from "./change_question.js";
+import { bodyOf, checked, DIRECTIONS, NUMBERS, numberFields, numbersAsAddress, QUICK, runoutOf, STRATEGIES } from "./change_question.js";
 
 const MOST = 12;
 /** The tooling that was written last is what somebody is working on. */
@@ -19,34 +19,18 @@ const FURTHER = ["method", "material", "deep", "ktc", "krc", "kac", "runout", "l
  * stand on, `material` in words where that says which is cut, `shaped` where a cutter may be no cylinder.
  */
 export function changeForm({ subject, materials, kinds, query, onchange }) {
-  const fields = Object.fromEntries(
-    NUMBERS.map(([key, kind, usual, name, , , label]) => {
-      const given = query.get(key);
-      return [key, quantity(label, kind, given === null || given === "" ? usual : Number(given), { name })];
-    }),
-  );
+  const fields = numberFields(NUMBERS, query);
   const runout = quantityListInput("displacement", runoutOf(query), { placeholder: "0 8 0 8" });
   fields.runout = field("Run-out, tooth by tooth", runout, { name: "cut.runout_um", unit: "displacement" });
   fields.runout.input = runout;
-  const picked = (name, options, usual) => {
-    const given = query.get(name) ?? usual;
-    return select(options, options.some(([value]) => value === given) ? given : usual);
-  };
-  const strategies = [
-    ["down", "Down milling"],
-    ["up", "Up milling"],
-  ];
-  const strategy = picked("st", strategies, "down");
-  const stocks = [
-    ["", "As where it cut before"],
-    ["block", "A block"],
-  ];
-  const stock = picked("stock", stocks, "");
+  const strategy = select(STRATEGIES, query.get("st"));
+  const stock = select([["", "As where it cut before"], ["block", "A block"]], query.get("stock"));
   // along a wall a block is but another radial immersion
   const shaped = subject.shaped || stock.value !== "";
-  const direction = picked("fd", ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]), "+X");
-  const method = picked("method", kinds, QUICK);
-  const material = picked("material", [["", subject.material ?? "Choose one, or write coefficients"], ...materials.map((each) => [each.name, each.name])], "");
+  const direction = select(DIRECTIONS, query.get("fd"));
+  const method = select(kinds, query.get("method"));
+  const matters = [["", subject.material ?? "Choose one, or write coefficients"], ...materials.map((each) => [each.name, each.name])];
+  const material = select(matters, query.get("material"));
   const button = h("button", { class: "primary" }, "Compute");
   const form = { tested: { name: query.get("cutfile") ?? "", cuts: fromAddress(query.get("cuts") ?? "") }, button };
   const slow = () => method.value !== QUICK;
@@ -138,7 +122,7 @@ export function changeForm({ subject, materials, kinds, query, onchange }) {
     fd: direction.value,
     method: method.value,
     material: material.value,
-    ...Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, fields[key].input.base === usual ? null : fields[key].input.base])),
+    ...numbersAsAddress(NUMBERS, fields),
     runout: runout.base?.join(" "),
     cuts: asAddress(form.tested.cuts),
     cutfile: form.tested.cuts.length ? form.tested.name : null,

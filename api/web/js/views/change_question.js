@@ -1,5 +1,6 @@
 // What is asked after a tool change: its fields, what they become, and what can be seen to be wrong before anything is sent.
 import { described, Problem } from "../api.js";
+import { quantity } from "../forms.js";
 import { text } from "../units.js";
 
 /** The method that answers at once. */
@@ -32,6 +33,18 @@ export const NUMBERS = [
   ["torque", "torque", null, "max_torque_nm", 1e-3, 1e6, "Spindle torque, at most"],
 ];
 
+/** Which way the teeth enter, and where the feed goes, for choices. */
+export const STRATEGIES = [["down", "Down milling"], ["up", "Up milling"]];
+export const DIRECTIONS = ["+X", "-X", "+Y", "-Y"].map((each) => [each, each.replace("-", "−")]);
+
+/** Fields for some of `NUMBERS`, with what an address says in place of what is usual. */
+export const numberFields = (numbers, query) =>
+  Object.fromEntries(numbers.map(([key, kind, usual, name, , , label]) => [key, quantity(label, kind, query.get(key) ? Number(query.get(key)) : usual, { name })]));
+
+/** What an address says of such fields: nothing of what is usual. */
+export const numbersAsAddress = (numbers, fields) =>
+  Object.fromEntries(numbers.map(([key, , usual]) => [key, fields[key].input.base === usual ? null : fields[key].input.base]));
+
 /** Most that an edge may stand out [µm]. */
 const OUT = 1000;
 
@@ -46,15 +59,8 @@ export function bodyOf(on, names, fields, { stock, strategy, direction, method, 
   const value = (key) => fields[key].input.base;
   const beside = stock === "block" ? { stock, y_from_mm: value("ya"), y_to_mm: value("yb") } : { immersion: value("im") / 100, strategy };
   const cut = { ...beside, feed_direction: direction };
-  for (const [key, name] of [
-    ["fz", "feed_per_tooth_mm"],
-    ["ktc", "ktc_mpa"],
-    ["krc", "krc"],
-    ["kac", "kac"],
-    ["land", "wear_land_um"],
-    ["dent", "indentation"],
-  ])
-    if (value(key) !== null) cut[name] = value(key);
+  const plain = NUMBERS.filter(([key]) => ["fz", "ktc", "krc", "kac", "land", "dent"].includes(key) && value(key) !== null);
+  for (const [key, , , name] of plain) cut[name.slice("cut.".length)] = value(key);
   // only a worn land rubs
   if (value("land") !== null) cut.friction = value("mu");
   if (value("runout") !== null) cut.runout_um = value("runout");

@@ -1,13 +1,10 @@
 // The contact between tool and holder.
 import { card, h } from "../dom.js";
-import { quantity } from "../forms.js";
+import { declaredField } from "../forms.js";
 
 /** The card for the declared keys of a contact and those of a tooling, `take(values)`, which fills it, and `write(found)`, which puts what is there into the keys to send. */
 export function contactCard(declared, keys) {
-  const contact = declared.map(({ key, label, hint }) => [
-    key,
-    quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint }),
-  ]);
+  const contact = declared.map((each) => [each.key, declaredField(each, "contact", keys.contact?.[each.key])]);
   return {
     box: card(
       "Contact between tool and holder",

@@ -1,7 +1,6 @@
 // The cutter's shape in the editor of a tooling: it asks only for what draws the shape that is chosen.
 import { fill, h } from "../dom.js";
-import { field, quantity, select } from "../forms.js";
-import { kindOf } from "../units.js";
+import { declaredField, field, quantity, select } from "../forms.js";
 import { SHAPES } from "./tooling_start.js";
 
 // what a corner radius is of, where it is no corner that may be left out
@@ -55,8 +54,7 @@ const rows = (points) => (points ?? []).map((point) => point.join(" ")).join(", 
 export function cutterShape(declared, keys) {
   const shape = select(SHAPES, keys.shape ?? "flat");
   const boxes = new Map();
-  for (const { key, label, unit, hint } of declared.filter(({ label, needed }) => label && !needed))
-    boxes.set(key, quantity(label, kindOf(unit), keys[key] ?? null, { name: `cutter.${key}`, hint }));
+  for (const each of declared.filter(({ label, needed }) => label && !needed)) boxes.set(each.key, declaredField(each, "cutter", keys[each.key]));
   const points = h("textarea", { rows: 3, autocomplete: "off", spellcheck: "false", placeholder: "0 0, 5 0, 8 3 3, 8 20" });
   points.value = rows(keys.profile);
   boxes.set(

@@ -1,6 +1,6 @@
 // What a drawing does not tell of a tooling: how well it is known, and which others share what is not.
 import { card, h } from "../dom.js";
-import { field, quantity, select } from "../forms.js";
+import { declaredField, field, select } from "../forms.js";
 import { factor, kindOf, plain } from "../units.js";
 
 /**
@@ -27,10 +27,9 @@ export function doubtCard(declared, keys, fresh) {
     ],
     silent ? "silent" : measured ? "exact" : "rough",
   );
-  const spreads = declared.map(({ key, label, unit, default: usual, hint }) => {
-    const kind = kindOf(unit);
-    const props = { placeholder: plain(usual * factor(kind), 4) };
-    return [key, quantity(label, kind, measured ? null : (keys.spread?.[key] ?? null), { name: `spread.${key}`, hint, props })];
+  const spreads = declared.map((each) => {
+    const placeholder = plain(each.default * factor(kindOf(each.unit)), 4);
+    return [each.key, declaredField(each, "spread", measured ? null : keys.spread?.[each.key], { placeholder })];
   });
   const rough = h(
     "div",

@@ -19,20 +19,17 @@ const BELOW = 5;
 
 /** The form: `element`, `button`, `kind`, `query()` for the service, `state()` for the address, `path(file, told)`, `stock(file)`. */
 export function pathForm({ machines, robots, postures, toolings, materials, query }) {
-  const picked = (options, given) => (options.some(([value]) => value === given) ? given : (options[0]?.[0] ?? ""));
   const carriers = [
     ...machines.map((each) => [`machine ${each.id}`, each.name]),
     ...robots.map((each) => [`robot ${each.name}`, `${each.words}, a robot`]),
   ];
-  const asked = select(QUESTIONS, picked(QUESTIONS, query.get("ask")));
-  const on = select(carriers, picked(carriers, query.get("on") ?? (query.has("machine") ? `machine ${query.get("machine")}` : null)));
+  const asked = select(QUESTIONS, query.get("ask"));
+  const on = select(carriers, query.get("on") ?? `machine ${query.get("machine")}`);
   const posture = h("input", { type: "text", autocomplete: "off", value: query.get("q") ?? "" });
-  const tools = toolings.map((each) => [each.name, each.name]);
-  const tooling = select(tools, picked(tools, query.get("tooling")));
+  const tooling = select(toolings.map((each) => [each.name, each.name]), query.get("tooling"));
   const matters = [["", "As in the identification"], ...materials.map((each) => [each.name, each.name])];
-  const material = select(matters, picked(matters, query.get("material")));
-  const ways = METHODS.map((each) => [each, each]);
-  const method = select(ways, picked(ways, query.get("method")));
+  const material = select(matters, query.get("material"));
+  const method = select(METHODS.map((each) => [each, each]), query.get("method"));
   const bands = h("input", { type: "checkbox", checked: query.get("bands") === "yes" });
   const speed = quantity("Spindle speed", "speed", numberOf(query.get("n")), { name: "spindle_speed_rpm", hint: "Where the path has none" });
   const cell = quantity("Between lines of material", "length", numberOf(query.get("cell")), { name: "cell_mm", hint: "Empty: a twentieth of the tool's radius" });

@@ -1,7 +1,8 @@
 // What is asked of an arm: which one, the angles of its joints, the tooling, and the cut.
 import { fill, h } from "../dom.js";
-import { field, quantity, select } from "../forms.js";
+import { field, select } from "../forms.js";
 import { plain, unit } from "../units.js";
+import { numberFields, NUMBERS as ASKED, numbersAsAddress, STRATEGIES } from "./change_question.js";
 
 /** The published arms, and a posture at which each would mill [°]. */
 export const PUBLISHED = {
@@ -9,14 +10,13 @@ export const PUBLISHED = {
   kr210: [20, 10, 30, 0, 30, 0],
   kr500: [-71.73, -68.62, 110.51, 35.54, -47.68, -204.68],
 };
-/** Name in the address, kind, default, name in the body, label. */
-export const NUMBERS = [
-  ["im", "percent", 50, "cut.immersion", "Radial immersion"],
-  ["from", "speed", 4000, "speeds.from_rpm", "From"],
-  ["to", "speed", 20_000, "speeds.to_rpm", "To"],
-  ["step", "speed", 100, "speeds.step_rpm", "Step"],
-  ["deep", "depth", 10, "max_depth_mm", "Deepest that is asked for"],
-];
+/** What is asked of its cut; its speeds lie wider apart. */
+const NUMBERS = ASKED.filter(([key]) => ["im", "from", "to", "step", "deep"].includes(key)).map(([key, kind, usual, ...rest]) => [
+  key,
+  kind,
+  key === "step" ? 100 : usual,
+  ...rest,
+]);
 /** Of a joint that turns without end. */
 const ENDLESS = [-360, 360];
 const within = (value, [low, high]) => Math.min(high, Math.max(low, value));
@@ -91,25 +91,13 @@ export function jointSliders(onmove, onchosen) {
 
 /** The form: `element`, `body(robot)` for lobes, `state()` for the address, `robot`, `tooling`. */
 export function robotForm({ robots, toolings, materials, query, sliders, onrobot, onask, onforget }) {
-  const picked = (options, given) => (options.some(([value]) => value === given) ? given : (options[0]?.[0] ?? ""));
-  const arms = robots.map((each) => [each.name, each.words]);
-  const robot = select(arms, picked(arms, query.get("robot")));
+  const robot = select(robots.map((each) => [each.name, each.words]), query.get("robot"));
   const tools = [["", "None"], ...toolings.map((each) => [each.name, each.name])];
-  const tooling = select(tools, picked(tools, query.get("tooling") ?? toolings[0]?.name));
-  const matters = materials.map((each) => [each.name, each.name]);
-  const material = select(matters, picked(matters, query.get("material")));
-  const ways = [
-    ["down", "Down milling"],
-    ["up", "Up milling"],
-  ];
-  const strategy = select(ways, picked(ways, query.get("st")));
+  const tooling = select(tools, query.get("tooling") ?? toolings[0]?.name);
+  const material = select(materials.map((each) => [each.name, each.name]), query.get("material"));
+  const strategy = select(STRATEGIES, query.get("st"));
   const only = h("input", { type: "checkbox", checked: query.get("only") === "yes" });
-  const fields = Object.fromEntries(
-    NUMBERS.map(([key, kind, usual, name, label]) => {
-      const given = query.get(key);
-      return [key, quantity(label, kind, given === null || given === "" ? usual : Number(given), { name })];
-    }),
-  );
+  const fields = numberFields(NUMBERS, query);
   const forget = h("button", { type: "button", class: "quiet danger small", onclick: () => onforget(robot.value) }, "Forget it");
   const follow = () => (forget.hidden = robots.find((each) => each.name === robot.value).published === true);
   robot.addEventListener("change", () => {
@@ -164,7 +152,7 @@ export function robotForm({ robots, toolings, materials, query, sliders, onrobot
       tooling: tooling.value,
       material: material.value,
       st: strategy.value === "down" ? null : strategy.value,
-      ...Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, value(key) === usual ? null : value(key)])),
+      ...numbersAsAddress(NUMBERS, fields),
     }),
   };
 }

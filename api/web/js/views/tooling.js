@@ -2,7 +2,7 @@
 import { getText, part, Problem, send, get } from "../api.js";
 import { add, card, fill, h, head, link, save, tell } from "../dom.js";
 import { drawn, picture } from "../drawing.js";
-import { busy, clearFaults, confirmed, failed, field, quantity, showProblem } from "../forms.js";
+import { busy, clearFaults, confirmed, declaredField, failed, field, quantity, showProblem } from "../forms.js";
 import { go, holdsEdits, to } from "../router.js";
 import { machine } from "../state.js";
 import { q, text } from "../units.js";
@@ -26,10 +26,8 @@ export async function view({ name = "" }, query, place) {
   const called = h("input", { autocomplete: "off", maxlength: 64 });
   called.value = name || (copied ? `${from}-copy` : "");
 
-  const cutter = {
-    teeth: quantity("Teeth", "none", keys.cutter.teeth, { name: "cutter.teeth" }),
-    diameter_mm: quantity("Cutting diameter", "length", keys.cutter.diameter_mm, { name: "cutter.diameter_mm" }),
-  };
+  const always = nouns.cutter.filter(({ label, needed }) => label && needed);
+  const cutter = Object.fromEntries(always.map((each) => [each.key, declaredField(each, "cutter", keys.cutter[each.key])]));
   const helix = h("input", { autocomplete: "off", placeholder: "0" });
   helix.value = [keys.cutter.helix_deg ?? 0].flat().join(", ");
   const shape = cutterShape(nouns.cutter, keys.cutter);
@@ -110,8 +108,7 @@ export async function view({ name = "" }, query, place) {
         "div",
         { class: "fields" },
         field("Name", called, { name: "name", hint: "Letters, digits and . _ + ( ) -", double: true }),
-        cutter.teeth,
-        cutter.diameter_mm,
+        Object.values(cutter),
         field("Helix [°]", helix, { name: "cutter.helix_deg", hint: "One, or one a tooth with commas" }),
         field("Pitch angles [°]", pitch, { name: "cutter.pitch_deg", hint: "For unequal pitch, with commas" }),
         stickout,
