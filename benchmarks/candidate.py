@@ -80,7 +80,7 @@ def passive(
     shares = FLANGE_ALONE if outputs == 1 else GAP_AND_FIXTURE
     softening = 0.01 * rng.standard_normal((m, m)) if outputs == 2 else np.zeros((0, 0))
     softening = softening + softening.T
-    points = np.column_stack([omega, rng.uniform(-1.0, 1.0, n), np.ones(n), np.zeros(n)])
+    points = np.column_stack([omega, np.ones(n), np.zeros(n), np.ones(n), rng.uniform(-1.0, 1.0, n)])
     holder = np.concatenate([flange, tip, np.zeros((n, 3))], axis=1)
     columns = 3 * m + pairs + 7 + (outputs == 2) * (m + 2 + pairs)
     weight, scale, gradient = np.ones((n, outputs), dtype=complex), np.ones(columns), np.empty((columns, 2 * n * outputs))

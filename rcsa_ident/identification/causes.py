@@ -20,9 +20,9 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.data import LEVER, IdentificationData
+from rcsa_ident.identification.further_unknowns import CutScales, Further, Grips, OrderFactors, Warming, order_factors, warmth
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.linearisation import Linearisation, Residual
-from rcsa_ident.identification.made_cuts import USUAL_PAUSE
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import cut_weights, evidence, model_error
 from rcsa_ident.identification.unknowns import JOINT, planes
@@ -33,8 +33,8 @@ _STEPS, _NOISES = 60, 3
 BELIEVED = 25.0
 #: Odds that a cause acts before anything was measured.
 ODDS = 0.1
-#: Time constants of the warmth that is asked for [s], and the exponent of the speed in the heat of friction.
-_CONSTANTS, _FRICTION = (450.0, 900.0, 1800.0), 1.25
+#: Time constants of the warmth that is asked for [s].
+_CONSTANTS = (450.0, 900.0, 1800.0)
 #: Spreads: of a natural frequency from the first to the last cut and over the speeds, of a cut's scale, of the force in an order of the
 #: teeth, of a clamping's joint stiffness, of that between quiet and loud cuts; and of where the flange's sensor looks [m].
 _DRIFT, _SCALE, _ORDER, _CLAMPING, _AMPLITUDE, _DISTANCE = 0.015, 0.03, 0.05, 0.06, 0.025, 20e-3
@@ -57,32 +57,24 @@ class Cause(StrEnum):
 class Explanation:
     """How well a cause explains what is left.
 
-    Parameters
-    ----------
-    cause : Cause
-    evidence : float [-]
-        Twice the logarithm of the odds against no cause.
-    share : float [-]
-        Of the squares of all residuals that it takes away.
+    `evidence` [-]: twice the logarithm of the odds against no cause
+    `share` [-]: of the squares of all residuals that it takes away
+    `way`: the likeliest of the ways in which it may act
     """
 
     cause: Cause
     evidence: float
     share: float
+    way: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Causes:
     """All causes that were asked, and what they would do to the answer together.
 
-    Parameters
-    ----------
-    found : tuple of Explanation
-        The likeliest first.
-    covariance : array, shape (p, p)
-        Of the answer's unknowns if any of them may act, about where the answer is.
-    without : float [-]
-        Probability that none of them acts.
+    `found`: the likeliest first
+    `covariance`, shape (p, p): of the answer's unknowns if any of them may act, about where the answer is
+    `without` [-]: probability that none of them acts
     """
 
     found: tuple[Explanation, ...]
@@ -103,14 +95,9 @@ class Causes:
 def causes(solution: Solution, misfit: Misfit, wider: float = 1.0) -> Causes:
     """Return what may stand behind the residuals of an answer.
 
-    Parameters
-    ----------
-    solution : Solution
-        With its equations.
-    misfit : Misfit
-        Whose minimum it is.
-    wider : float
-        Factor on all standard deviations.
+    `solution`: with its equations
+    `misfit`: whose minimum it is
+    `wider`: factor on all standard deviations
     """
     linear, residual = solution.evaluation.linear, solution.evaluation.residual
     assert linear is not None
@@ -127,7 +114,7 @@ def causes(solution: Solution, misfit: Misfit, wider: float = 1.0) -> Causes:
         best = max(range(len(ways)), key=lambda k: asked[k][0])
         # the likeliest of several ways, any of which might have been it
         likelihood = asked[best][0] - 2.0 * float(np.log(len(ways)))
-        found.append(Explanation(cause, likelihood, asked[best][1] / max(squares, 1e-300)))
+        found.append(Explanation(cause, likelihood, asked[best][1] / max(squares, 1e-300), best))
         columns.append(ways[best])
     if not found:
         return Causes((), wider**2 * inverse, 1.0)
@@ -143,25 +130,43 @@ def causes(solution: Solution, misfit: Misfit, wider: float = 1.0) -> Causes:
     return Causes(tuple(found), covariance, float(odds[0] / odds.sum()))
 
 
-def with_orders(solution: Solution, misfit: Misfit) -> float:
-    """Return minus twice the log evidence of an answer [-], with factors on the forces of the teeth's orders where that is likelier.
+def further_unknowns(found: Explanation, data: IdentificationData) -> Further | None:
+    """Return what makes a cause a part of the model; None where nothing does, or where it is in the data already."""
+    more: Further
+    ids = data.cut_ids[: data.cuts]
+    match found.cause:
+        case Cause.ORDER:
+            more = order_factors(data)
+        case Cause.SCALE:
+            more = CutScales(ids)
+        case Cause.CLAMPING:
+            more = Grips(data.toolings)
+        case Cause.TEMPERATURE:
+            if np.any(np.isnan(data.made.temperature)):
+                return None
+            more = Warming(ids, None)
+        case Cause.TIME:
+            # the first way is an even course
+            more = Warming(ids, _CONSTANTS[max(found.way - 1, 0)] if found.way else _CONSTANTS[1])
+        case _:
+            return None
+    return None if any(isinstance(each, type(more)) for each in data.further) else more
 
-    A factor is one for all toolings: the law of the chip, the edge's force and the angle of entry are much the same for them.
-    """
-    data, layout = misfit.data, planes(solution.layout)
-    orders = [np.rint(axis.order).astype(np.intp) for axis in data.axes]
-    known = {key: k for k, key in enumerate((i, m) for i, own in enumerate(orders) for m in np.unique(own).tolist())}
-    slopes = [np.zeros((own.size, 2 * len(known)), dtype=complex) for own in orders]
-    for i, (own, slope) in enumerate(zip(orders, slopes, strict=True)):
-        at = np.array([known[i, m] for m in own.tolist()], dtype=np.intp)
-        slope[np.arange(own.size), 2 * at], slope[np.arange(own.size), 2 * at + 1] = 1.0, 1j
-    further = misfit.with_data(data.with_unknowns((_ORDER,) * (2 * len(known)), slopes), misfit.cut_weight)
-    more = replace(layout, coefficients=layout.coefficients + 2 * len(known))
-    start = np.insert(solution.theta, layout.force.stop, np.zeros(2 * len(known)))
+
+def with_orders(solution: Solution, misfit: Misfit) -> float:
+    """Return minus twice the log evidence of an answer [-], with factors on the forces of the teeth's orders where that is likelier."""
+    if any(isinstance(each, OrderFactors) for each in misfit.data.further):
+        return evidence(solution, misfit)
+    alike = replace(misfit.data, made=replace(misfit.data.made, kind=np.zeros_like(misfit.data.made.kind)))
+    layout, data = planes(solution.layout), replace(order_factors(alike), spread=_ORDER).on(alike)
+    count = len(data.coefficient_spread) - layout.coefficients
+    more = replace(layout, coefficients=layout.coefficients + count)
+    further = misfit.with_data(data, misfit.cut_weight)
+    start = np.insert(solution.theta, layout.force.stop, np.zeros(count))
     found = refine(further, start, more, solution.evaluation.nuisance, _STEPS)
     for _ in range(_NOISES):
         # with the right forces less is left unexplained
-        further = misfit.with_data(further.data, cut_weights(found, further), model_error(found, further))
+        further = misfit.with_data(data, cut_weights(found, further), model_error(found, further))
         found = refine(further, found.theta, more, found.evaluation.nuisance, _STEPS)
     return min(evidence(solution, misfit), evidence(found, further))
 
@@ -247,25 +252,8 @@ def _loudness(solution: Solution, misfit: Misfit) -> FloatArray:
 
 
 def _courses(data: IdentificationData) -> list[FloatArray]:
-    """Ways in which the machine may change with time: evenly, and as heat of friction that bearings and housing take up, shape (k,) each.
-
-    One time constant stands for them: T' = (n^p - T) / tau, from the cold machine on.
-    """
-    order = np.argsort(data.made.started, kind="stable")
-    started, speed = data.made.started[order], data.spindle_speed[: data.cuts][order]
-    heat = (speed / max(float(speed.max(initial=0.0)), 1e-300)) ** _FRICTION
-    found = [_spread_out(data.made.started)]
-    for constant in _CONSTANTS:
-        warmth, now = np.zeros(heat.size), 0.0
-        for k, pause in enumerate(np.diff(started, append=started[-1:] + USUAL_PAUSE)):
-            # half of the cut lies behind its recording's middle
-            kept = np.exp(-0.5 * pause / constant)
-            warmth[k] = now * kept + heat[k] * (1.0 - kept)
-            now = warmth[k] * kept + heat[k] * (1.0 - kept)
-        course = np.empty(heat.size)
-        course[order] = warmth
-        found.append(_spread_out(course))
-    return found
+    """Ways in which the machine may change with time: evenly, and as heat of friction that it takes up, shape (k,) each."""
+    return [_spread_out(each) for each in (data.made.started, *(warmth(data, constant) for constant in _CONSTANTS))]
 
 
 def _spread_out(course: FloatArray) -> FloatArray:

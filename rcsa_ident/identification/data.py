@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -41,46 +42,27 @@ class AxisData:
 
     Behind the cuts stand hammer tests (`HammerLines`), as cuts of one output without an air cut whose forces are measured.
 
-    Parameters
-    ----------
-    axis : Dof
-    omega, order : arrays, shape (n,) [rad/s], [-]
-        Frequency of each point, and that over the spindle's.
-    variance : array, shape (n, o) [m^2/N^2]
-        Variance of the real and imaginary part each.
-    lines : complex array, shape (n, o, 2) [m/N]
-        Cut and turned air cut over the simulated force.
-    cut : array of int, shape (n,)
-        Index into the data's cuts.
-    flange : complex array, shape (n, 3) [m/N]
-        A22 of the cut's tooling: tt, tr, rr, scaled by the lever.
-    tip : complex array, shape (n, 2) [m/N]
-        A21 for a force at the tip: t, r.
-    force_slope : complex array, shape (n, c) [-]
-        Change of the force's logarithm with each uncertain coefficient.
-    force, across : complex arrays, shape (n,) [N]
-        Force along this axis, and along the other one in the same lines; empty where the latter is not told.
-    across_slope : complex array, shape (n, c) or (0, c) [-]
-        `force_slope` of the other axis' force, without smooth errors.
-    beside : array, shape (n, o) or (0, o) [m^2/N^2]
-        What is added to the lines' own power where their model error is a share of it.
-    on_holder : array of bool, shape (n,) or (0,)
-        Points whose motion is the tool-holder's, not the machine's; empty where there are none.
-    still : array of bool, shape (n,) or (0,)
-        Points at which the spindle did not turn; empty where there are none.
-    point : complex array, shape (n, 3) or (0, 3) [m/N]
-        Of those: their free receptance to the force, and minus that to the flange: t, r.
-    sweep : array, shape (n, 2) or (0, 2) [rad/s^2], [s]
-        By which a line's frequency changes, and for how long; empty where none does.
-    around : complex array, shape (n, 2, 5) or (0, 2, 5) [m/N]
-        `flange` and `tip` at `node` below and above each frequency.
-    talk : complex array, shape (n, o, 2) or (0, 0, 0) [m/N]
-        What `lines` would hold besides if a sensor felt as much of the other axis' motion as of its own; empty where none does.
-    shares : array, shape (o, 1 + e) or (0, 0) [-]
-        What of the flange's motion, and of that of other places of the machine, is in each output. The first output, or the first two, is
-        what a search looks for: the flange's motion, or where no sensor sees that, another place's.
-    behind : float [-]
-        How far behind the joint the flange's sensor looks, over the lever; negative: at the holder.
+    `omega`, `order`: arrays, shape (n,) [rad/s], [-]; frequency of each point, and that over the spindle's
+    `variance` [m^2/N^2], shape (n, o): variance of the real and imaginary part each
+    `lines` [m/N], shape (n, o, 2): cut and turned air cut over the simulated force
+    `cut`: array of int, shape (n,); index into the data's cuts
+    `flange` [m/N], shape (n, 3): A22 of the cut's tooling: tt, tr, rr, scaled by the lever
+    `tip` [m/N], shape (n, 2): A21 for a force at the tip: t, r
+    `force_slope` [-], shape (n, c): change of the force's logarithm with each uncertain coefficient
+    `force`, `across` [N], shape (n,): force along this axis, and along the other one in the same lines; empty where the latter is not told
+    `across_slope`: complex array, shape (n, c) or (0, c) [-]; `force_slope` of the other axis' force, without smooth errors
+    `beside`: array, shape (n, o) or (0, o) [m^2/N^2]; what is added to the lines' own power where their model error is a share of it
+    `on_holder`: array of bool, shape (n,) or (0,); points whose motion is the tool-holder's, not the machine's; empty where there are none
+    `still`: array of bool, shape (n,) or (0,); points at which the spindle did not turn; empty where there are none
+    `point`: complex array, shape (n, 3) or (0, 3) [m/N]; of those: their free receptance to the force, and minus that to the flange: t, r
+    `sweep`: array, shape (n, 2) or (0, 2) [rad/s^2], [s]; by which a line's frequency changes, and for how long; empty where none does
+    `around`: complex array, shape (n, 2, 5) or (0, 2, 5) [m/N]; `flange` and `tip` at `node` below and above each frequency
+    `talk`: complex array, shape (n, o, 2) or (0, 0, 0) [m/N]; what `lines` would hold besides if a sensor felt as much of the other axis'
+        motion as of its own; empty where none does
+    `shares`: array, shape (o, 1 + e) or (0, 0) [-]. What of the flange's motion, and of that of other places of the machine, is in each
+        output. The first output, or the first two, is what a search looks for: the flange's motion, or where no sensor sees that, another
+        place's.
+    `behind` [-]: how far behind the joint the flange's sensor looks, over the lever; negative: at the holder
     """
 
     axis: Dof
@@ -113,16 +95,12 @@ class AxisData:
         for name in ("on_holder", "still"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.bool_))
 
-    def kernel_points(self, relative_speed: FloatArray) -> FloatArray:
-        """Return frequency, relative speed, whose motion it is, and whether the spindle stands, as the kernel takes them, shape (n, 4).
-
-        Parameters
-        ----------
-        relative_speed : array, shape (n,)
-        """
+    @property
+    def kernel_points(self) -> FloatArray:
+        """Frequency, whose motion it is, whether the spindle stands, and the joint's factor 1, as the kernel takes them, shape (n, 4)."""
         own = ~self.on_holder if self.on_holder.size else np.ones(self.omega.size)
         still = self.still if self.still.size else np.zeros(self.omega.size)
-        return np.column_stack([self.omega, relative_speed, own, still])
+        return np.column_stack([self.omega, own, still, np.ones(self.omega.size)])
 
     @property
     def kernel_holder(self) -> ComplexArray:
@@ -211,44 +189,33 @@ def nodes(sweep: FloatArray) -> FloatArray:
 class IdentificationData:
     """All cuts of a campaign, and behind them its hammer tests: cuts without an air cut whose forces are measured.
 
-    Parameters
-    ----------
-    cut_ids : tuple of str, length k
-    cut_tooling : array of int, shape (k,)
-    toolings : tuple of str
-    axes : tuple of AxisData
-    spindle_speed : array, shape (k,) [rad/s]
-    cut_prior : CutPrior
-    clamping : array of int, shape (k,)
-        Which unknown tooth angle stands between the cut's trigger and its delay; -1 where there is none.
-    edge : array, shape (k, 2)
-        Time of that trigger's edge [s] and its weight [1/s^2].
-    coefficients : tuple of ForceCoefficient, length c
-        What is uncertain about the forces.
-    coefficient_spread : tuple of float, length c or more
-        Their standard deviations; behind them those of smooth errors, which have no name.
-    turning : mapping of tooling to Turning
-        Its receptances while it turns; empty where nobody asks for them.
-    tests : tuple of HammerLines
-        The last of the cuts. Their gains have no name among the coefficients either and stand in front of the smooth errors.
-    softening_spread : float or None [-]
-        Standard deviation of the stiffness' change from the middle to the end of the speeds; None where nobody told any.
-    talk_place : mapping of Dof to int
-        Where the share that an axis' sensor feels of the other axis' motion stands among the coefficients.
-    distance_place : mapping of Dof to int
-        Where what is not known of an axis' `behind` stands among them.
-    distance_told : bool
-        Whether somebody has told where the flange's sensors look.
-    made : MadeCuts
-        When the cuts, without the tests, were made, and which of them judge the answer.
-    rough : RoughToolings or None
-        What drawings do not tell; unknowns in units of their spreads, behind the gains and in front of the smooth errors.
-    rough_holders : tuple of RoughToolHolder
-        One for each tooling, where there is something that drawings do not tell.
-    rough_first : int
-        Where their unknowns begin among the coefficients.
-    rough_start : array, shape (u,)
-        Values of theirs at which `flange` and `tip` of the axes stand, and from which a fit starts.
+    `cut_ids`: tuple of str, length k
+    `cut_tooling`: array of int, shape (k,)
+    `spindle_speed` [rad/s], shape (k,)
+    `clamping`: array of int, shape (k,); which unknown tooth angle stands between the cut's trigger and its delay; -1 where there is none
+    `edge`, shape (k, 2): time of that trigger's edge [s] and its weight [1/s^2]
+    `coefficients`: tuple of ForceCoefficient, length c; what is uncertain about the forces
+    `coefficient_spread`: tuple of float, length c or more; their standard deviations; behind them those of smooth errors, which have no
+        name
+    `turning`: mapping of tooling to Turning, its receptances while it turns; empty where nobody asks for them
+    `tests`: the last of the cuts. Their gains have no name among the coefficients either and stand in front of the smooth errors.
+    `softening_spread` [-]: standard deviation of the stiffness' change from the middle to the end of the speeds; None where nobody told any
+    `talk_place`: where the share that an axis' sensor feels of the other axis' motion stands among the coefficients
+    `distance_place`: where what is not known of an axis' `behind` stands among them
+    `distance_told`: whether somebody has told where the flange's sensors look
+    `made`: when the cuts, without the tests, were made, and which of them judge the answer
+    `rough`: what drawings do not tell; unknowns in units of their spreads, behind the gains and in front of the smooth errors
+    `rough_holders`: one for each tooling, where there is something that drawings do not tell
+    `rough_first`: where their unknowns begin among the coefficients
+    `rough_start`, shape (u,): values of theirs at which `flange` and `tip` of the axes stand, and from which a fit starts
+    `further`: what `identification.further_unknowns` has added
+    `warmth`: array, shape (k,) or (0,) [-]; how much warmer the machine was at each cut than the one that is answered for, as a share of
+        what it warms up by; empty where that is not in the model
+    `course`, shape (k, q): how that changes with each of what is not known of it
+    `course_first`: where these begin among the coefficients
+    `steady` [-]: how much warmer a warm machine is at the highest speed than at the middle one
+    `grip`: array of int, shape (k,) or (0,); where the logarithm of a factor on the joint's stiffnesses stands among the coefficients, of
+        each cut; -1 where there is none
     """
 
     cut_ids: tuple[str, ...]
@@ -272,6 +239,12 @@ class IdentificationData:
     rough_holders: tuple[RoughToolHolder, ...] = ()
     rough_first: int = 0
     rough_start: FloatArray = field(default_factory=lambda: np.zeros(0))
+    further: tuple[Any, ...] = ()
+    warmth: FloatArray = field(default_factory=lambda: np.zeros(0))
+    course: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    course_first: int = 0
+    steady: float = 0.0
+    grip: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
     def __post_init__(self) -> None:
         if self.made is None:
@@ -289,6 +262,11 @@ class IdentificationData:
         return tuple(self.toolings[t] for t in np.unique(self.cut_tooling))
 
     @property
+    def course_place(self) -> slice:
+        """Where what is not known of the warmth stands among the coefficients."""
+        return slice(self.course_first, self.course_first + self.course.shape[1])
+
+    @property
     def rough_place(self) -> slice:
         """Where what drawings do not tell stands among the coefficients."""
         return slice(self.rough_first, self.rough_first + (0 if self.rough is None else len(self.rough.unknowns)))
@@ -304,12 +282,8 @@ class IdentificationData:
     def with_unknowns(self, spread: tuple[float, ...], slopes: Sequence[FloatArray] | Sequence[ComplexArray] | None) -> IdentificationData:
         """Return the same data with further unknowns behind the coefficients.
 
-        Parameters
-        ----------
-        spread : tuple of float
-            Their standard deviations.
-        slopes : sequence of array, or None
-            How the logarithms of each axis' lines change with them, shape (n, unknowns); None where they do not.
+        `spread`: their standard deviations
+        `slopes`: how the logarithms of each axis' lines change with them, shape (n, unknowns); None where they do not
         """
         axes = []
         for i, axis in enumerate(self.axes):
@@ -418,12 +392,8 @@ class IdentificationData:
         Where the model of force, tool-holder or sensor is off by a little, it is off by nearly the same in neighbouring lines,
         and no number of cuts averages that out.
 
-        Parameters
-        ----------
-        share : float
-            Standard deviation of each term's real and imaginary part.
-        terms : int
-            Chebyshev polynomials from 0 Hz to the highest line.
+        `share`: standard deviation of each term's real and imaginary part
+        `terms`: Chebyshev polynomials from 0 Hz to the highest line
         """
         toolings = len(self.toolings)
         highest = max(float(a.omega.max()) for a in self.axes)
@@ -452,6 +422,9 @@ class IdentificationData:
             cut_prior=CutPrior(*self.cut_prior.columns[keep].T),
             clamping=self.clamping[keep],
             edge=self.edge[keep],
+            warmth=self.warmth[keep] if self.warmth.size else self.warmth,
+            course=self.course[keep] if self.course.size else self.course,
+            grip=self.grip[keep] if self.grip.size else self.grip,
             made=self.made.of(keep[keep < self.cuts]),
         )
 

@@ -13,13 +13,14 @@ from rcsa_ident.base.scaleout import Map
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.assemble_result import CoupledFit, Fit, PlaneFit
 from rcsa_ident.identification.candidate import Candidate
-from rcsa_ident.identification.causes import with_orders
+from rcsa_ident.identification.causes import BELIEVED, Cause, further_unknowns, with_orders
 from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupled_data
 from rcsa_ident.identification.coupled.fit import coupled_starts, fit_coupled
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.score import STRIKES, Coupling, coupling
 from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
+from rcsa_ident.identification.further_unknowns import Further, Warming
 from rcsa_ident.identification.joint_fit import (
     AxisSearch,
     axis_search,
@@ -56,6 +57,8 @@ ATTEMPTS = 3
 FREED_ATTEMPTS, SAME = 3, 20.0
 #: Further searches where drawings are rough, at the toolings of the best answer so far.
 ROUGH_ATTEMPTS = 4
+#: Courses of warmth that are tried, each about the one before.
+COURSES = 4
 #: Windows of a tooling's passes that are enough to find its modes; the polish takes all.
 ENOUGH = 40
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
@@ -68,16 +71,9 @@ PLAIN, PLAIN_GAIN = 50.0, 1000.0
 class EvidenceSelection:
     """Variance-weighted misfit with delays profiled per cut; passive by construction; the data choose the number of modes.
 
-    Parameters
-    ----------
-    priors : Priors
-    search : SearchSettings
-    coarse : tuple of float
-        Model errors of the stages before the data's own: they smooth the landscape.
-    candidates : int
-        Members of the population that are refined and compared.
-    start : mapping of Dof to Posterior or PlaneUnknowns, optional
-        An earlier answer of the same machine: with it nothing is explored, its modes are refined with the new cuts.
+    `coarse`: model errors of the stages before the data's own: they smooth the landscape
+    `candidates`: members of the population that are refined and compared
+    `start`: an earlier answer of the same machine: with it nothing is explored, its modes are refined with the new cuts
     """
 
     priors: Priors = field(default_factory=Priors)
@@ -94,15 +90,9 @@ class EvidenceSelection:
     def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
         """Return the identification.
 
-        Parameters
-        ----------
-        data : IdentificationData
-        seed : int
-            Same seed, same answer, whatever `map` is.
-        map : callable
-            The builtin, or a pool's: axes are searched side by side.
-        progress : callable, optional
-            Told of every step; with a pool's map it has to be picklable.
+        `seed`: same seed, same answer, whatever `map` is
+        `map`: the builtin, or a pool's: axes are searched side by side
+        `progress`: told of every step; with a pool's map it has to be picklable
         """
         if not_finite(data):
             return failed(data, seed, self.name)
@@ -125,9 +115,11 @@ class EvidenceSelection:
                 found = self._agreed(data, found, sequence, map, trace, progress)
             if data.sweeps:
                 found = self._asked(data, found, map, _report_to(BOTH, trace, progress))
+            assert isinstance(found, PlaneFit | CoupledFit)
             if whole is not data:
-                assert isinstance(found, PlaneFit | CoupledFit)
                 found = replace(found, whole=whole)
+            if isinstance(found, PlaneFit) and not data.sweeps and not data.tests and data.rough is None:
+                found = self._freed(found, whole, sequence, map, trace, progress)
             return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
@@ -153,6 +145,59 @@ class EvidenceSelection:
             if found[1].evidence - found[0].evidence < SAME:
                 break
         return found[0]
+
+    def _freed(
+        self,
+        found: PlaneFit,
+        whole: IdentificationData,
+        sequence: np.random.SeedSequence,
+        map: Map,
+        trace: list[Step],
+        progress: Progress | None,
+    ) -> PlaneFit:
+        """Return the fit with what its lines ask for beyond it, cause by cause, each searched anew and kept where it is likelier.
+
+        `whole`: with the cuts that judge the answer, which the causes act on, too
+        """
+        refused: set[Cause] = set()
+        while True:
+            asked = [each for each in found.causes.believed if each.cause not in refused]
+            further = next(((each.cause, more) for each in asked if (more := further_unknowns(each, whole)) is not None), None)
+            if further is None:
+                return found
+            refused.add(further[0])
+            try:
+                other = self._with(further[1], whole, sequence, map, trace, progress)
+            except (ArithmeticError, np.linalg.LinAlgError):
+                continue
+            if other is not None and other.evidence < found.evidence - BELIEVED:
+                found, whole = other, other.data if other.whole is None else other.whole
+
+    def _with(
+        self,
+        more: Further,
+        whole: IdentificationData,
+        sequence: np.random.SeedSequence,
+        map: Map,
+        trace: list[Step],
+        progress: Progress | None,
+    ) -> PlaneFit | None:
+        """Return the fit with further unknowns, the likeliest where a course is linearised anew; None where planes are not apart."""
+        best: PlaneFit | None = None
+        for _ in range(COURSES):
+            on_all = more.on(whole)
+            data = on_all.learned_from()
+            found = self._found(data, data, sequence, map, trace, progress)
+            if not isinstance(found, PlaneFit):
+                return best
+            if best is not None and found.evidence > best.evidence:
+                return best
+            best = found if data is on_all else replace(found, whole=on_all)
+            nearer = more.moved(found.solution.theta[found.solution.layout.force][data.course_place]) if isinstance(more, Warming) else None
+            if nearer is None:
+                return best
+            more = nearer
+        return best
 
     def _found(
         self,
@@ -212,7 +257,8 @@ class EvidenceSelection:
         first = first_starts(smooth, self.priors, searched, map)
         if data.sweeps:
             smooth = unswept(data, self.priors, first[0].theta, first[0].layout).with_smooth_errors(SMOOTH_ERROR)
-        points = coupled_data(smooth) if couplable(smooth) and not data.sweeps and data.rough is None else None
+        asked = couplable(smooth) and not data.sweeps and data.rough is None and not data.further
+        points = coupled_data(smooth) if asked else None
         together: CoupledFit | None = None
         if points is not None and self._felt(points, first[0], *learned_noise(searched)).score > PLAIN:
             apart, misfit = fit_roughly(smooth, self.priors, searched, first[0], report)
@@ -324,13 +370,7 @@ def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Repor
 class SearchAxis:
     """The search of one axis, from random starts or from an earlier answer; it answers with an `AxisSearch`.
 
-    Parameters
-    ----------
-    method : EvidenceSelection
-    data : IdentificationData
-        Of one axis, with one output.
-    sequence : SeedSequence
-    progress : callable or None
+    `data`: of one axis, with one output
     """
 
     phase: ClassVar[Phase] = Phase.SEARCH
@@ -389,13 +429,7 @@ class SearchFromOtherAxis:
 
     It answers with an `AxisSearch` of its own candidates and the new one.
 
-    Parameters
-    ----------
-    method : EvidenceSelection
-    data : IdentificationData
-        Of one axis, with one output.
-    own, other : AxisSearch
-    progress : callable or None
+    `data`: of one axis, with one output
     """
 
     phase: ClassVar[Phase] = Phase.OTHER_AXIS

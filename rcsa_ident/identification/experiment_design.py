@@ -65,16 +65,10 @@ class Volume:
 class CandidateCuts:
     """Candidate cuts, and what is wanted of them.
 
-    Parameters
-    ----------
-    rows : tuple of k arrays, shape (r, d) each
-        J of each candidate, each with as many rows as it needs.
-    targets : tuple of arrays, shape (d, t) each
-        W of everything that is wanted, scaled so that trace(W^T C W) is a relative variance.
-    floor : tuple of float
-        Relative variance of each target that no cut can lower.
-    apart : array of bool, shape (k, k)
-        True for two candidates that may not both be cut; the diagonal is True.
+    `rows`: tuple of k arrays, shape (r, d) each; J of each candidate, each with as many rows as it needs
+    `targets`: tuple of arrays, shape (d, t) each; W of everything that is wanted, scaled so that trace(W^T C W) is a relative variance
+    `floor`: relative variance of each target that no cut can lower
+    `apart`: array of bool, shape (k, k); True for two candidates that may not both be cut; the diagonal is True
     """
 
     rows: tuple[FloatArray, ...]
@@ -148,13 +142,7 @@ def greedy(prospects: CandidateCuts, count: int, goal: Goal, among: Sequence[int
 
     Each cut is a rank-r update of J C for all candidates: about 4 R r d flops, R rows in all.
 
-    Parameters
-    ----------
-    prospects : CandidateCuts
-    count : int
-    goal : Goal
-    among : sequence of int, optional
-        Candidates to choose from; by default all.
+    `among`: candidates to choose from; by default all
     """
     state = _State.of(prospects)
     free = np.ones(len(prospects.rows), dtype=bool) if among is None else np.isin(np.arange(len(prospects.rows)), among)
@@ -169,14 +157,8 @@ def greedy(prospects: CandidateCuts, count: int, goal: Goal, among: Sequence[int
 def exchanged(prospects: CandidateCuts, chosen: Sequence[int], goal: Goal, passes: int = 1) -> list[int]:
     """Return the cuts after each in turn was put back against all others (Fedorov's exchange, [fedorov1972]), in greedy order.
 
-    Parameters
-    ----------
-    prospects : CandidateCuts
-    chosen : sequence of int
-        The cuts to start from.
-    goal : Goal
-    passes : int
-        Rounds at most; the first without a change is the last.
+    `chosen`: the cuts to start from
+    `passes`: rounds at most; the first without a change is the last
     """
     state = _State.of(prospects)
     cuts = list(chosen)
@@ -200,15 +182,10 @@ def d_optimal(information: Sequence[FloatArray], count: int, prior: FloatArray, 
 
     Greedy choice, then exchange, of det(prior + sum of the chosen information); the most telling first, none twice.
 
-    Parameters
-    ----------
-    information : sequence of k arrays, shape (p, p)
-        What each candidate tells, S^T Sigma^-1 S with S the slopes of its readings with the unknowns and Sigma their covariance.
-    count : int
-    prior : array, shape (p, p)
-        What is known before, positive definite.
-    passes : int
-        Rounds of exchange at most.
+    `information`: sequence of k arrays, shape (p, p); what each candidate tells, S^T Sigma^-1 S with S the slopes of its readings with the
+        unknowns and Sigma their covariance
+    `prior`, shape (p, p): what is known before, positive definite
+    `passes`: rounds of exchange at most
 
     Examples
     --------
@@ -239,18 +216,11 @@ def expected_cut(
 ) -> CutMeasurement:
     """Return what a cut would measure, with empty lines of the variance that they would have.
 
-    Parameters
-    ----------
-    cut_id, tooling : str
-    spindle_speed : float [rad/s]
-    teeth : int
-    force, slope : complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]
-        As `cutting.force.force_and_slope` gives them, at the tooth-passing harmonics from the first on: they do not depend on the
-        speed, which only decides how many of them lie in the band.
-    noise : float [m]
-        Standard deviation of a displacement line's real and imaginary part each; it falls with the root of a record's length.
-    axes : sequence of Dof
-        Those that would be measured: X, Y or both.
+    `spindle_speed` [rad/s]
+    `force`, `slope`: complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]; as `cutting.force.force_and_slope` gives them, at the
+        tooth-passing harmonics from the first on: they do not depend on the speed, which only decides how many of them lie in the band
+    `noise` [m]: standard deviation of a displacement line's real and imaginary part each; it falls with the root of a record's length
+    `axes`: those that would be measured: X, Y or both
     """
     positive("noise", noise, "m")
     order = harmonics(teeth, spindle_speed)
@@ -282,13 +252,8 @@ def information(data: IdentificationData, posteriors: Mapping[Dof, Posterior], m
     Unknowns: of each axis its posterior's directions and rivals (each axis with the joint as it knows it), then the uncertain
     coefficients of the forces, which all cuts share.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        Cuts from `expected_cut`; what their lines hold does not matter.
-    posteriors : mapping of Dof to Posterior
-    model_error : mapping of Dof to float
-        Share of each line that neither model nor noise explains; at least `LEAST_MODEL_ERROR`.
+    `data`: cuts from `expected_cut`; what their lines hold does not matter
+    `model_error`: share of each line that neither model nor noise explains; at least `LEAST_MODEL_ERROR`
     """
     cuts = len(data.cut_ids)
     sizes = [unknowns(posteriors[a.axis]) for a in data.axes]
@@ -332,10 +297,7 @@ def unknowns(posterior: Posterior) -> int:
 def tip_changes(posterior: Posterior, holder: Receptance) -> tuple[ComplexArray, ComplexArray]:
     """Return a tooltip FRF at the middle speed, shape (n,) [m/N], and its change with the axis' whitened unknowns, shape (n, unknowns).
 
-    Parameters
-    ----------
-    holder : Receptance
-        Tool-holder, free, in one bending plane: points ``tip`` and ``flange``.
+    `holder`: tool-holder, free, in one bending plane: points ``tip`` and ``flange``
     """
     values, slopes = _tip(posterior.theta, posterior.layout, holder)
     rivals = [_tip(r, posterior.layout_of(r.size - JOINT), holder)[0] - values for r in posterior.rivals]
@@ -353,7 +315,9 @@ def _lines(axis: AxisData, spindle_speed: FloatArray, posterior: Posterior) -> t
     middle, half = posterior.speed_range
     # as `Posterior.machine`: outside the campaign's speeds the nearest of them answers
     x = np.clip((spindle_speed - middle) / half, -1.0, 1.0) if half > 0.0 else np.zeros(spindle_speed.size)
-    points, holder = axis.kernel_points(x), axis.kernel_holder
+    points, holder = axis.kernel_points, axis.kernel_holder
+    if posterior.layout.softening:
+        points = np.column_stack([points, x])
     values, slopes = _cross(posterior.theta, posterior.layout, points, holder, True)
     rivals = [_cross(r, posterior.layout_of(r.size - JOINT), points, holder, False)[0] - values for r in posterior.rivals]
     return values, np.column_stack([slopes @ _directions(posterior), *rivals])
@@ -368,12 +332,12 @@ def _cross(
     axis, joint = unpack(theta[:-JOINT], layout), scaled_joint(theta[-JOINT:])
     n, one = points.shape[0], np.ones((1, 1))
     here = np.zeros(2)
-    values, kept, _ = cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, joint, (one, here), points, holder)
+    values, kept, _ = cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.changes, joint, (one, here), points, holder)
     rows = np.empty((theta.size, 2 * n if slopes else 0))
     if slopes:
         # the kernel's joint is in units of itself, its logarithm is the unknown
         scale, weight = np.concatenate([chain(axis, layout), joint]), np.ones((n, 1), dtype=complex)
-        cross_frf_gradient(axis.omega_n, axis.factor, axis.softening, joint, (one, here), points, kept, weight, scale, rows)
+        cross_frf_gradient(axis.omega_n, axis.factor, axis.changes, joint, (one, here), points, kept, weight, scale, rows)
     columns, core = (rows[:, : rows.shape[1] // 2] + 1j * rows[:, rows.shape[1] // 2 :]).T, layout.core
     columns[:, core - 3 : core] = columns[:, core - 3 : core] @ residual_turn(axis.residual)
     return values[:, 0], columns

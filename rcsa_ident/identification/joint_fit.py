@@ -37,17 +37,10 @@ ROUGHLY = 1e-3
 class AxisSearch:
     """What the search of one axis came to.
 
-    Parameters
-    ----------
-    candidates : list of Candidate
-        By evidence, best first.
-    evidences : list of float
-        Minus twice the log evidence of each.
-    model_error : float [-]
-        Share of each line that is left unexplained, as the best search has learned it.
-    cut_weight : array, shape (k,)
-        Factor on the weights of each cut's lines, as the best search has learned it.
-    trace : list of Step
+    `candidates`: by evidence, best first
+    `evidences`: minus twice the log evidence of each
+    `model_error` [-]: share of each line that is left unexplained, as the best search has learned it
+    `cut_weight`, shape (k,): factor on the weights of each cut's lines, as the best search has learned it
     """
 
     candidates: list[Candidate]
@@ -86,15 +79,9 @@ def fit_roughly(
 ) -> tuple[Solution, Misfit]:
     """Return about where a start leads with a stiffness that is free to change with speed, and the misfit there.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        As in `fit_jointly`.
-    priors : Priors
-    searched : list of AxisSearch
-    first : Candidate
-        From `first_starts`.
-    report : callable of (stage, cost, solution)
+    `data`: as in `fit_jointly`
+    `first`: from `first_starts`
+    `report`: callable of (stage, cost, solution)
     """
 
     misfit_of = partial(Misfit, data, priors)
@@ -107,16 +94,10 @@ def fit_jointly(
 ) -> tuple[Solution, Misfit]:
     """Return the solution of all axes together, with as many modes as the evidence asks for, and its misfit.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        All axes, with both outputs where they were recorded.
-    priors : Priors
-    searched : list of AxisSearch
-        One for each axis.
-    first : list of Candidate
-        From `first_starts`.
-    report : callable of (stage, cost, solution)
+    `data`: all axes, with both outputs where they were recorded
+    `searched`: one for each axis
+    `first`: from `first_starts`
+    `report`: callable of (stage, cost, solution)
     """
 
     misfit_of = partial(Misfit, data, priors)
@@ -136,15 +117,9 @@ def fit_jointly(
 def fit_with_places(data: IdentificationData, priors: Priors, found: Solution, misfit: Misfit, report: Report) -> tuple[Solution, Misfit]:
     """Return the solution for lines that show further places, from one for those without, and its misfit.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        As in `fit_jointly`.
-    priors : Priors
-    found : Solution
-    misfit : Misfit
-        Of the solution without them: what it has learned of the noise.
-    report : callable of (stage, cost, solution)
+    `data`: as in `fit_jointly`
+    `misfit`: of the solution without them: what it has learned of the noise
+    `report`: callable of (stage, cost, solution)
     """
     start = _start(data, found.candidate, any(axis.softening for axis in planes(found.layout).axes))
     found, misfit = refine_and_learn_noise(partial(Misfit, data, priors), start, misfit.model_error, misfit.cut_weight, report)
@@ -156,16 +131,10 @@ def grow_jointly(
 ) -> tuple[Solution, Misfit, Solution]:
     """Return the solution with more modes than the evidence asks for, the misfit whose minimum it is, and what the evidence has chosen.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        As in `fit_jointly`.
-    priors : Priors
-    chosen : Solution
-        From `fit_jointly`.
-    misfit : Misfit
-        Its misfit.
-    report : callable of (stage, cost, solution)
+    `data`: as in `fit_jointly`
+    `chosen`: from `fit_jointly`
+    `misfit`: its misfit
+    `report`: callable of (stage, cost, solution)
     """
 
     misfit_of = partial(Misfit, data, priors)
@@ -195,16 +164,9 @@ def _from_several_starts(data: IdentificationData, priors: Priors, searched: lis
 class JointStart:
     """A first polish of all axes together, at first roughly and with the flange's motion alone; it answers with a `Candidate`.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    priors : Priors
-    searched : list of AxisSearch
-        One for each axis.
-    coarse : float
-        Least model error of the rough polish.
-    source : int or None
-        Axis whose joint and force it starts from; None is the mean over the axes.
+    `searched`: one for each axis
+    `coarse`: least model error of the rough polish
+    `source`: axis whose joint and force it starts from; None is the mean over the axes
     """
 
     phase: ClassVar[Phase] = Phase.BOTH_AXES
@@ -247,19 +209,12 @@ def refine_and_learn_noise(
 ) -> tuple[Solution, Misfit]:
     """Polish and learn the noise in turns until it stays.
 
-    Parameters
-    ----------
-    misfit_of : callable
-        The model error of each axis and the cuts' weights to a misfit.
-    start : (array, Unknowns, array)
-        Unknowns, their layout, the cuts' delays and angles.
-    shares : tuple of float [-]
-        Model error of each axis to begin with.
-    weight : array, shape (k,)
-        Factor on each cut's weights to begin with.
-    report : callable of (stage, cost, solution)
-    tolerance : float
-        As in `refine`.
+    `misfit_of`: the model error of each axis and the cuts' weights to a misfit
+    `start`: (array, Unknowns, array); unknowns, their layout, the cuts' delays and angles
+    `shares`: tuple of float [-], model error of each axis to begin with
+    `weight`, shape (k,): factor on each cut's weights to begin with
+    `report`: callable of (stage, cost, solution)
+    `tolerance`: as in `refine`
     """
     theta, layout, nuisance = start
     for _ in range(4):
@@ -277,7 +232,13 @@ def _start(data: IdentificationData, found: Candidate, softening: bool) -> tuple
     """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
     old = planes(found.layout)
     axes = tuple(
-        replace(a, places=axis.places, softening=softening, standstill=data.stands_still and bool(np.any(axis.still)))
+        replace(
+            a,
+            places=axis.places,
+            softening=softening,
+            warming=data.warmth.size > 0,
+            standstill=data.stands_still and bool(np.any(axis.still)),
+        )
         for a, axis in zip(old.axes, data.axes, strict=True)
     )
     layout = Layout(axes, len(data.coefficient_spread), data.clampings)

@@ -17,18 +17,11 @@ USUAL_PAUSE = 90.0
 class CutPrior:
     """What is known beforehand of each cut's delay and of the angle to its air cut; arrays of shape (k,).
 
-    Parameters
-    ----------
-    delay : array [s]
-        From a trigger of known tooth angle.
-    delay_weight : array [1/s^2]
-        Inverse variance of it; 0 without such a trigger.
-    angle_weight : array [1/rad^2]
-        Inverse variance of the angle between cut and air cut, whose mean is 0.
-    tooth_period : array [s]
-        In which the delay may lie anywhere where nothing is known of it: a turn where teeth are unlike.
-    pitches : array
-        How many teeth pass in it; by default one.
+    `delay` [s]: from a trigger of known tooth angle
+    `delay_weight` [1/s^2]: inverse variance of it; 0 without such a trigger
+    `angle_weight` [1/rad^2]: inverse variance of the angle between cut and air cut, whose mean is 0
+    `tooth_period` [s]: in which the delay may lie anywhere where nothing is known of it: a turn where teeth are unlike
+    `pitches`: how many teeth pass in it; by default one
     """
 
     delay: FloatArray
@@ -63,19 +56,16 @@ class CutPrior:
 class MadeCuts:
     """What a campaign tells of its cuts beside their recordings; arrays of shape (k,).
 
-    Parameters
-    ----------
-    started : array [s]
-        When each began, since the first one; at even distances in the campaign's order where nobody tells it.
-    temperature : array [°C]
-        Near the bearings; not a number where nobody tells it.
-    judged : array of bool
-        Whether the cut is predicted, and nothing is learned from it.
+    `started` [s]: when each began, since the first one; at even distances in the campaign's order where nobody tells it
+    `temperature` [°C]: near the bearings; not a number where nobody tells it
+    `judged`: whether the cut is predicted, and nothing is learned from it
+    `kind`: the same for cuts of like engagement and feed per tooth
     """
 
     started: FloatArray
     temperature: FloatArray
     judged: np.ndarray
+    kind: np.ndarray
 
     def of(self, keep: np.ndarray) -> MadeCuts:
         """Return the same of some cuts, by their indices."""
@@ -84,4 +74,4 @@ class MadeCuts:
 
 def in_order(count: int) -> MadeCuts:
     """Return so many cuts, of which nothing is told but their order."""
-    return MadeCuts(USUAL_PAUSE * np.arange(count), np.full(count, np.nan), np.zeros(count, dtype=bool))
+    return MadeCuts(USUAL_PAUSE * np.arange(count), np.full(count, np.nan), np.zeros(count, dtype=bool), np.zeros(count, dtype=np.intp))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -28,20 +29,12 @@ HOLDER = 6
 class Evaluation:
     """Cost at a vector, and its normal equations where asked for.
 
-    Parameters
-    ----------
-    cost : float [-]
-        chi2 of all axes, of the cuts' priors and of the parameters' priors.
-    nuisance : array, shape (k, 2)
-        Delay [s] and angle [rad] of each cut at the optimum for this vector.
-    models : tuple of complex arrays, shape (n, o) [m/N]
-        The model's cross FRFs on the lines of each axis.
-    residual : Residual
-        Its squares add up to the cost.
-    linear : Linearisation or None
-        Gradient and Gauss-Newton matrix of half the cost, where asked for.
-    answers : sequence of Answer
-        What they can be made of, until they are.
+    `cost` [-]: chi2 of all axes, of the cuts' priors and of the parameters' priors
+    `nuisance`, shape (k, 2): delay [s] and angle [rad] of each cut at the optimum for this vector
+    `models`: tuple of complex arrays, shape (n, o) [m/N]; the model's cross FRFs on the lines of each axis
+    `residual`: its squares add up to the cost
+    `linear`: gradient and Gauss-Newton matrix of half the cost, where asked for
+    `answers`: what they can be made of, until they are
     """
 
     cost: float
@@ -66,14 +59,8 @@ class Evaluation:
 class Misfit:
     """The residual of an identification.
 
-    Parameters
-    ----------
-    data : IdentificationData
-    priors : Priors
-    model_error : tuple of float [-]
-        Standard deviation of what the force model leaves out, as a share of each line, for each axis.
-    cut_weight : array, shape (k,), optional
-        Factor on the weights of each cut's lines: below 1 for one that contradicts the others.
+    `model_error`: tuple of float [-], standard deviation of what the force model leaves out, as a share of each line, for each axis
+    `cut_weight`, shape (k,): factor on the weights of each cut's lines: below 1 for one that contradicts the others
     """
 
     def __init__(
@@ -85,9 +72,7 @@ class Misfit:
         self.cut_weight = np.ones(len(data.cut_ids)) if cut_weight is None else cut_weight
         # where little is told, forces are far from those that were simulated: they add up exactly
         exact = {c.term: k for k, c in enumerate(data.coefficients) if not c.tooling} if data.rough is not None else {}
-        self._axes = tuple(
-            WeightedLines(a, self.relative_speed, f, self.cut_weight, exact) for a, f in zip(data.axes, model_error, strict=True)
-        )
+        self._axes = tuple(WeightedLines(a, self._states, f, self.cut_weight, exact) for a, f in zip(data.axes, model_error, strict=True))
         # lines of all axes, cut by cut: a cut's delay and angle are the same for both
         cut = np.concatenate([a.cut for a in self._axes])
         self._order = np.argsort(cut, kind="stable")
@@ -114,17 +99,10 @@ class Misfit:
     def evaluate(self, theta: FloatArray, layout: Unknowns, nuisance: FloatArray, grid: int = 0, normal: bool = False) -> Evaluation:
         """Return the cost at `theta`, and with `normal` its gradient and Hessian.
 
-        Parameters
-        ----------
-        theta : array, shape (p,)
-            See `parameters`.
-        layout : Layout
-        nuisance : array, shape (k, 2)
-            Delay [s] and angle [rad] at which each cut's fit starts; not changed.
-        grid : int
-            Delays tried over a tooth-passing period; 0 stays near `nuisance`.
-        normal : bool
-            Whether gradient and Gauss-Newton matrix are made, too.
+        `theta`, shape (p,): see `parameters`
+        `nuisance`, shape (k, 2): delay [s] and angle [rad] at which each cut's fit starts; not changed
+        `grid`: delays tried over a tooth-passing period; 0 stays near `nuisance`
+        `normal`: whether gradient and Gauss-Newton matrix are made, too
         """
         answers = self._answers(theta, layout)
         models = [answer.model for answer in answers]
@@ -138,15 +116,7 @@ class Misfit:
         return self.linearised(here, theta, layout) if normal else here
 
     def linearised(self, here: Evaluation, theta: FloatArray, layout: Unknowns) -> Evaluation:
-        """Return an evaluation with its gradient and Hessian.
-
-        Parameters
-        ----------
-        here : Evaluation
-            At `theta`, as `evaluate` has returned it.
-        theta : array, shape (p,)
-        layout : Layout
-        """
+        """Return an evaluation with its gradient and Hessian. `here`: at `theta`, as `evaluate` has returned it. `theta`, shape (p,)."""
         answers = self._with_slopes(here.answers, theta, layout)
         linear = self._linearise(theta, layout, answers, here.residual, here.nuisance, self._cut_prior(theta, layout))
         return replace(here, linear=linear, answers=())
@@ -162,12 +132,8 @@ class Misfit:
     def residual_at(self, theta: FloatArray, layout: Unknowns, nuisance: FloatArray) -> Residual:
         """Return the residual with the cuts' delays and angles as they are given.
 
-        Parameters
-        ----------
-        theta : array, shape (p,)
-        layout : Layout
-        nuisance : array, shape (k, 2)
-            Delay [s] and angle [rad] of each cut.
+        `theta`, shape (p,)
+        `nuisance`, shape (k, 2): delay [s] and angle [rad] of each cut
         """
         return self._residual(theta, layout, self.models(theta, layout), nuisance, self._cut_prior(theta, layout))
 
@@ -175,6 +141,12 @@ class Misfit:
     def relative_speed(self) -> FloatArray:
         """Spindle speed of each cut within those over which the machine changes, from -1 to 1, shape (k,) [-]."""
         return self.data.relative_speed
+
+    @property
+    def _states(self) -> FloatArray:
+        """What the stiffness may change with at each cut: warmth and relative speed, shape (k, 2)."""
+        warmth = self.data.warmth if self.data.warmth.size else np.zeros(self.relative_speed.size)
+        return np.column_stack([warmth, self.relative_speed])
 
     def rows(self, layout: Unknowns) -> PriorRows:
         """Return the priors of a layout's unknowns before any cut of the machine."""
@@ -205,16 +177,44 @@ class Misfit:
             axis = unpack(theta[layout.axis(i)], part)
             both = np.append(joint, axis.standstill)
             holder = lines.with_toolings(toolings[i]) if toolings else lines.holder
-            seen = self.seen_at(i, theta, layout)
-            machine = axis.omega_n, axis.shapes, axis.factor, axis.softening, both
-            values, kept, turned = cross_frf(*machine, (lines.shares, seen), lines.points, holder)
+            seen, points = self.seen_at(i, theta, layout), self._points(i, theta, layout)
+            machine = axis.omega_n, axis.shapes, axis.factor, axis.changes, both
+            values, kept, turned = cross_frf(*machine, (lines.shares, seen), points, holder)
             factor, slope = lines.drawn_force, lines.force_slope[:, :0]
             if layout.coefficients:
                 factor, slope = lines.force(theta[layout.force])
                 values *= factor[:, None]
-            felt = _Felt(seen, turned, self.distance_place(i, layout))
+            changes = self._grips(i, layout), self._course(i, layout), self.data.course_place
+            felt = _Felt(seen, turned, self.distance_place(i, layout), points, *changes)
             answers.append(_AxisAnswer(values, kept, factor, slope, axis, part, both, toolings[i] if toolings else [], felt))
         return answers
+
+    def _points(self, i: int, theta: FloatArray, layout: Layout) -> FloatArray:
+        """The points of an axis as the kernel takes them, with the states that its machine changes with, shape (n, 4 + s)."""
+        lines, part, grips = self._axes[i], layout.axes[i], self._grips(i, layout)
+        points = lines.in_states[part.warming, part.softening]
+        course = self._course(i, layout)
+        if grips.size or course.size:
+            points, logs = points.copy(), np.append(theta[layout.force], 0.0)
+            if grips.size:
+                points[:, 3] = np.exp(logs[grips])
+            if course.size:
+                # the first of the states
+                points[:, 4] += course @ logs[self.data.course_place]
+                # the gradient is asked for over it
+                points[points[:, 4] == 0.0, 4] = 1e-9
+        return points
+
+    def _course(self, i: int, layout: Layout) -> FloatArray:
+        """How the warmth in each line changes with what is not known of it, shape (n, q); empty where that is not asked for."""
+        data = self.data
+        asked = layout.axes[i].warming and data.course.size and data.course_place.stop <= layout.coefficients
+        return data.course[data.axes[i].cut] if asked else np.zeros((0, 0))
+
+    def _grips(self, i: int, layout: Unknowns) -> np.ndarray:
+        """Where what each line's joint is stiffer by stands among the coefficients, shape (n,); empty where all are alike."""
+        grip = self.data.grip
+        return grip[self.data.axes[i].cut] if grip.size and np.max(grip) < layout.coefficients else np.zeros(0, dtype=np.intp)
 
     def seen_at(self, i: int, theta: FloatArray, layout: Unknowns) -> FloatArray:
         """Return how far behind the joint an axis' flange sensor looks, over the lever, and 1 where it looks at the holder, shape (2,)."""
@@ -317,20 +317,9 @@ class Misfit:
         half = np.concatenate([upper, (mixed[:, 1] - low[:, None] * upper) / second[:, None]])
         hessian -= half.T @ half
         index = tuple(lines.cut for lines in self._axes)
-        linear = Linearisation(
-            layout,
-            tuple(jacobians),
-            tuple(all_columns),
-            index,
-            known.jacobian,
-            cut_prior,
-            clamping,
-            np.empty(0),
-            hessian,
-            inner,
-            mixed,
-            tuple(compliance),
-        )
+        lines_of = tuple(jacobians), tuple(all_columns), index
+        normal = np.empty(0), hessian, inner, mixed
+        linear = Linearisation(layout, *lines_of, known.jacobian, cut_prior, clamping, *normal, tuple(compliance))
         return replace(linear, gradient=linear.pull(residual))
 
     def _clamping(self, layout: Unknowns, prior: CutPrior) -> tuple[np.ndarray, FloatArray]:
@@ -349,7 +338,7 @@ class WeightedLines:
     def __init__(
         self,
         axis: AxisData,
-        relative_speed: FloatArray,
+        states: FloatArray,
         model_error: float,
         cut_weight: FloatArray,
         exact: Mapping[ForceTerm, int] | None = None,
@@ -357,7 +346,9 @@ class WeightedLines:
         o = axis.outputs
         self.outputs = o
         self.shares = axis.output_shares
-        self.points = axis.kernel_points(relative_speed[axis.cut])
+        self.points, every = axis.kernel_points, itertools.product((False, True), repeat=2)
+        # with the states that a layout asks for
+        self.in_states = {each: np.hstack([self.points, states[axis.cut][:, each]]) for each in every}
         self.holder = axis.kernel_holder
         self.force_slope = axis.force_slope
         self.drawn_force = np.ones(axis.omega.size, dtype=complex)
@@ -390,7 +381,7 @@ class WeightedLines:
 
     def with_toolings(self, toolings: Sequence[ToolingAt]) -> ComplexArray:
         """The tool-holders' receptances with those of rough toolings in place of the drawn ones, shape (n, 8)."""
-        return placed(self.holder, toolings, self.points[:, 2] == 0.0)
+        return placed(self.holder, toolings, self.points[:, 1] == 0.0)
 
     def force(self, logs: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """What the forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c)."""
@@ -413,11 +404,23 @@ class Answer(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Felt:
-    """Where an axis' flange sensor looks, the slope there at each point, and the unknown's place among the coefficients."""
+    """What differs between an axis' lines beside the machine.
+
+    `seen`, shape (2,): where the flange's sensor looks
+    `turned`, shape (n,): the slope there
+    `place`: where what is not known of the former stands among the coefficients
+    `points`, shape (n, 4 + s): as the kernel took them
+    `grips`, shape (n,): where what their joints are stiffer by stands
+    `course`, shape (n, q): how their warmth changes with what stands at `course_place`
+    """
 
     seen: FloatArray
     turned: ComplexArray
     place: int | None
+    points: FloatArray
+    grips: np.ndarray
+    course: FloatArray
+    course_place: slice
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -444,8 +447,8 @@ class _AxisAnswer:
         root = -lines.root.reshape(n, o)
         out = np.empty((own + max(forces, holder), 2 * n * o))
         rows, weight = out[: own + holder], root * self.factor[:, None]
-        machine = axis.omega_n, axis.factor, axis.softening, self.joint
-        cross_frf_gradient(*machine, (lines.shares, self.felt.seen), lines.points, self.kept, weight, scale, rows)
+        machine = axis.omega_n, axis.factor, axis.changes, self.joint
+        cross_frf_gradient(*machine, (lines.shares, self.felt.seen), self.felt.points, self.kept, weight, scale, rows)
         compliance = _complex(out[bare])
         out[bare] = (RESIDUAL_UNIT * residual_turn(axis.residual)).T @ out[bare]
         with_holder = _complex(out[own : own + holder])
@@ -453,6 +456,15 @@ class _AxisAnswer:
         if self.felt.place is not None:
             change = (weight * lines.shares[:, 0] * self.felt.turned[:, None]).ravel()
             out[own + self.felt.place] = np.concatenate([change.real, change.imag])
+        stiffer = np.tile(np.repeat(self.felt.grips, o), 2)
+        for place in np.unique(stiffer[stiffer >= 0]):
+            grip = stiffer == place
+            out[own + place, grip] = out[own - JOINT, grip] + out[own - JOINT + 1, grip]
+        if self.felt.course.size:
+            # each of the warming's rows is the change with an entry, times the warmth
+            entries = axis.warming[np.tril_indices(axis.order)] @ out[self.layout.parts["warming"]]
+            by_warmth = entries / np.tile(np.repeat(self.felt.points[:, 4], o), 2)
+            out[own:][self.felt.course_place] = np.tile(np.repeat(self.felt.course.T, o, axis=1), 2) * by_warmth
         for each in self.toolings:
             moved = with_holder.reshape(n, o, holder)[each.points, :, : each.values.shape[1]] @ each.slopes
             place = (each.points[:, None] * o + np.arange(o)).ravel()

@@ -24,27 +24,20 @@ def _none() -> FloatArray:
 class ModalParameters:
     """Modes and what goes with them; what a machine does not have is empty.
 
-    Parameters
-    ----------
-    omega_n : array, shape (m,) [rad/s]
-    psi : array, shape (m, d) [1/sqrt(kg)]
-        Mass-normalised shapes at the flange: translation, and slope times the lever; of both planes (d = 4) those of X, then those of Y.
-    factor : array, shape (m, m) [sqrt(rad/s)]
-        L of the damping matrix D = L L^T in modal coordinates.
-    residual : array, shape (d, d) [sqrt(m/N)]
-        Lower triangular factor R_f of the residual compliance R_f R_f^T, the modes above the band.
-    places : array, shape (m, e) [1/sqrt(kg)]
-        The modes' shapes at other places of the machine: a gap sensor's fixture (of both planes in X, then in Y), the housing.
-    place_residual : array, shape (e, d) [m/N]
-        Residual compliance between each of them and the flange.
-    softening : array, shape (m, m) or (0, 0) [-]
-        Symmetric: K_ij = omega_i omega_j (delta_ij + x softening_ij) at relative speed x.
-    standstill : array, shape (2,) or (0,) [-]
-        Shares by which natural frequencies and damping matrix differ where the spindle stands still.
-    skew : array, shape (m, m) or (0, 0) [-]
-        G: a velocity of mode j at spindle speed W pushes mode i with W G_ij.
-    pull : array, shape (m, d) or (0, 0) [sqrt(kg)]
-        What a motion of the housing in the flange's directions pulls each mode with.
+    `omega_n` [rad/s], shape (m,)
+    `psi` [1/sqrt(kg)], shape (m, d): mass-normalised shapes at the flange: translation, and slope times the lever; of both planes (d = 4)
+        those of X, then those of Y
+    `factor` [sqrt(rad/s)], shape (m, m): L of the damping matrix D = L L^T in modal coordinates
+    `residual` [sqrt(m/N)], shape (d, d): lower triangular factor R_f of the residual compliance R_f R_f^T, the modes above the band
+    `places` [1/sqrt(kg)], shape (m, e): the modes' shapes at other places of the machine: a gap sensor's fixture (of both planes in X, then
+        in Y), the housing
+    `place_residual` [m/N], shape (e, d): residual compliance between each of them and the flange
+    `softening`: array, shape (m, m) or (0, 0) [-]; symmetric: K_ij = omega_i omega_j (delta_ij + x softening_ij) at relative speed x
+    `standstill`: array, shape (2,) or (0,) [-]; shares by which natural frequencies and damping matrix differ where the spindle stands
+        still
+    `skew`: array, shape (m, m) or (0, 0) [-]; G: a velocity of mode j at spindle speed W pushes mode i with W G_ij
+    `pull`: array, shape (m, d) or (0, 0) [sqrt(kg)]; what a motion of the housing in the flange's directions pulls each mode with
+    `warming`: array, shape (m, m) or (0, 0) [-]; as softening, with `IdentificationData.warmth`
     """
 
     omega_n: FloatArray
@@ -57,6 +50,7 @@ class ModalParameters:
     standstill: FloatArray = field(default_factory=lambda: np.zeros(0))
     skew: FloatArray = field(default_factory=_none)
     pull: FloatArray = field(default_factory=_none)
+    warming: FloatArray = field(default_factory=_none)
 
     @property
     def order(self) -> int:
@@ -69,8 +63,14 @@ class ModalParameters:
         residual = np.vstack([self.residual, self.place_residual])
         return np.ascontiguousarray(np.vstack([np.hstack([self.psi, self.places]), residual.T]))
 
+    @property
+    def changes(self) -> FloatArray:
+        """What the stiffness changes by with each state, one below the other as the plane's kernel takes it, shape (s m, m) or (0, 0)."""
+        known = [each for each in (self.warming, self.softening) if each.size]
+        return np.vstack(known) if known else _none()
+
     def at(self, x: float) -> ModalParameters:
-        """Return the machine at relative speed x (-1 and 1 are the campaign's lowest and highest), in its own modes there."""
+        """Return the warm machine at relative speed x (-1 and 1 are the campaign's lowest and highest), in its own modes there."""
         if self.softening.size == 0:
             return self
         stiffness = np.outer(self.omega_n, self.omega_n) * (np.eye(self.order) + x * self.softening)
@@ -83,6 +83,7 @@ class ModalParameters:
             factor=lower_factor(turn.T @ self.factor),
             places=turn.T @ self.places,
             softening=_none(),
+            warming=_none(),
             standstill=np.zeros(0),
             skew=turn.T @ self.skew @ turn if self.skew.size else self.skew,
             pull=turn.T @ self.pull if self.pull.size else self.pull,
@@ -98,6 +99,7 @@ class ModalParameters:
             factor=lower_factor(self.factor[modes]),
             places=self.places[modes],
             softening=self.softening[block] if self.softening.size else self.softening,
+            warming=self.warming[block] if self.warming.size else self.warming,
             skew=self.skew[block] if self.skew.size else self.skew,
             pull=self.pull[modes] if self.pull.size else self.pull,
         )
@@ -109,12 +111,8 @@ class ModalParameters:
     def with_mode(self, omega_n: float, psi: FloatArray | tuple[float, ...], zeta: float = 0.05) -> ModalParameters:
         """Return the machine with one more mode in front, uncoupled to the others, which moves neither other places nor the housing.
 
-        Parameters
-        ----------
-        omega_n : float [rad/s]
-        psi : array, shape (d,) [1/sqrt(kg)]
-        zeta : float [-]
-            Damping ratio.
+        `omega_n` [rad/s]; `psi` [1/sqrt(kg)], shape (d,)
+        `zeta` [-]: damping ratio
         """
         factor = np.pad(self.factor, ((1, 0), (1, 0)))
         factor[0, 0] = np.sqrt(2.0 * zeta * omega_n)
@@ -125,6 +123,7 @@ class ModalParameters:
             factor=factor,
             places=np.pad(self.places, ((1, 0), (0, 0))),
             softening=np.pad(self.softening, ((1, 0), (1, 0))) if self.softening.size else self.softening,
+            warming=np.pad(self.warming, ((1, 0), (1, 0))) if self.warming.size else self.warming,
             skew=np.pad(self.skew, ((1, 0), (1, 0))) if self.skew.size else self.skew,
             # a spindle without a mode has no pull to tell from one that is not asked for
             pull=np.pad(self.pull, ((1, 0), (0, 0))) if self.pull.shape[1] else self.pull,

@@ -28,14 +28,8 @@ def unswept(data: IdentificationData, priors: Priors, theta: FloatArray, layout:
 
     The second order, which is left out, is about the square of the first: that much each line may be wrong by.
 
-    Parameters
-    ----------
-    data : IdentificationData
-        As measured.
-    priors : Priors
-    theta : array, shape (p,)
-        About the machine and its joint; what else it holds does not matter.
-    layout : Unknowns
+    `data`: as measured
+    `theta`, shape (p,): about the machine and its joint; what else it holds does not matter
     """
     if not data.sweeps:
         return data

@@ -76,24 +76,18 @@ class ModalBlock:
     In the vector's order: log natural frequencies (m); mass-normalised shapes by modes (d m); what the housing's motion pulls a mode with
     (d m); the lower triangle of the damping factor L by rows, its diagonal as logarithm; the lower triangle of the residual compliance's
     factor; of each other place its shapes (m) and its residual to the flange (d); what standing still changes (2); the lower triangle of
-    the softening by rows; the gyroscopic coupling.
+    the warming by rows, and that of the softening; the gyroscopic coupling.
 
-    Parameters
-    ----------
-    modes : int
-    places : int
-        Other places of the machine whose motion is in the outputs: a displacement sensor's fixture (one a plane), the spindle's housing.
-    softening : bool
-        The stiffness changes with the spindle's speed.
-    standstill : bool
-        Some of the lines belong to a spindle that stands still: all natural frequencies and all damping may differ by a share there.
-    directions : int
-        2 of one bending plane, translation and lever x slope; `DIRECTIONS` of both.
-    pulls : bool
-        The housing moves.
-    skew : int
-        How the gyroscopic coupling G is written: none (0), as a sum of so many a b^T - b a^T, each what a disc's two slopes do, or
-        entry by entry (`EVERY_PAIR`).
+    `places`: other places of the machine whose motion is in the outputs: a displacement sensor's fixture (one a plane), the spindle's
+        housing
+    `softening`: the stiffness changes with the spindle's speed
+    `warming`: the stiffness changes as the machine warms up; the block describes the warm one
+    `standstill`: some of the lines belong to a spindle that stands still: all natural frequencies and all damping may differ by a share
+        there
+    `directions`: 2 of one bending plane, translation and lever x slope; `DIRECTIONS` of both
+    `pulls`: the housing moves
+    `skew`: how the gyroscopic coupling G is written: none (0), as a sum of so many a b^T - b a^T, each what a disc's two slopes do, or
+        entry by entry (`EVERY_PAIR`)
     """
 
     modes: int
@@ -103,6 +97,7 @@ class ModalBlock:
     directions: int = 2
     pulls: bool = False
     skew: int = 0
+    warming: bool = False
 
     @cached_property
     def parts(self) -> Mapping[str, slice]:
@@ -116,6 +111,7 @@ class ModalBlock:
             "residual": d * (d + 1) // 2,
             "places": (m + d) * self.places,
             "standstill": 2 * self.standstill,
+            "warming": pairs * self.warming,
             "softening": pairs * self.softening,
             "skew": m * (m - 1) // 2 if self.skew == EVERY_PAIR else 2 * m * self.skew,
         }
@@ -138,9 +134,9 @@ class ModalBlock:
 
     @cached_property
     def machine(self) -> np.ndarray:
-        """Places of all that describes the flange while it turns: neither other places nor what standing still changes."""
+        """Places of all that describes the flange while it turns and is warm: neither other places nor what standing still changes."""
         places = np.arange(self.size)
-        return np.concatenate([places[: self.core], places[self.parts["standstill"].stop :]])
+        return np.concatenate([places[: self.core], places[self.parts["warming"].stop :]])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -175,6 +171,7 @@ class ModalBlock:
             "residual": priors.residual,
             "places": ([priors.shape] * self.modes + [priors.residual**2] * self.directions) * self.places,
             "standstill": priors.standstill if self.standstill else (),
+            "warming": 2.0 * priors.softening,
             "softening": priors.softening,
             # an entry of G is the product of two slopes; twice the share of rotary kinetic energy bounds it
             "skew": priors.skew if self.skew == EVERY_PAIR else np.sqrt(priors.skew),
@@ -216,10 +213,13 @@ def unpack(part: FloatArray, block: ModalBlock) -> ModalParameters:
     factor[rows, cols] = lower
     residual[lower_triangle(d)[:2]] = RESIDUAL_UNIT * of["residual"]
     beside = of["places"].reshape(block.places, m + d)
-    softening = skew = np.zeros((0, 0))
+    softening = warming = skew = np.zeros((0, 0))
     if block.softening:
         softening = np.zeros((m, m))
         softening[rows, cols] = softening[cols, rows] = of["softening"]
+    if block.warming:
+        warming = np.zeros((m, m))
+        warming[rows, cols] = warming[cols, rows] = of["warming"]
     if block.skew:
         if block.skew == EVERY_PAIR:
             half = np.zeros((m, m))
@@ -231,7 +231,7 @@ def unpack(part: FloatArray, block: ModalBlock) -> ModalParameters:
     pull = of["pulls"].reshape(m, d) if block.pulls else np.zeros((0, 0))
     shapes = of["shapes"].reshape(m, d)
     places, still = (beside[:, :m].T, PLACE_UNIT * beside[:, m:]), of["standstill"]
-    return ModalParameters(np.exp(of["frequencies"]), shapes, factor, residual, *places, softening, still, skew, pull)
+    return ModalParameters(np.exp(of["frequencies"]), shapes, factor, residual, *places, softening, still, skew, pull, warming)
 
 
 def pack(machine: ModalParameters, block: ModalBlock | None = None, discs: FloatArray | None = None) -> FloatArray:
@@ -239,12 +239,7 @@ def pack(machine: ModalParameters, block: ModalBlock | None = None, discs: Float
 
     Of other places the block's first ones are told, and those that the machine does not know rest.
 
-    Parameters
-    ----------
-    machine : ModalParameters
-    block : ModalBlock, optional
-    discs : array, shape (skew, 2, m), optional
-        The gyroscopic coupling's a and b; by default none, or with `EVERY_PAIR` the machine's own entries.
+    `discs`, shape (skew, 2, m): the gyroscopic coupling's a and b; by default none, or with `EVERY_PAIR` the machine's own entries
     """
     m, d = machine.psi.shape
     block = ModalBlock(m, directions=d) if block is None else block
@@ -262,6 +257,7 @@ def pack(machine: ModalParameters, block: ModalBlock | None = None, discs: Float
         "residual": machine.residual[lower_triangle(d)[:2]] / RESIDUAL_UNIT,
         "places": beside.ravel(),
         "standstill": machine.standstill,
+        "warming": machine.warming[rows, cols] if machine.warming.size else None,
         "softening": machine.softening[rows, cols] if machine.softening.size else None,
         "skew": None if discs is None else discs.ravel(),
     }
@@ -354,13 +350,8 @@ class Unknowns(ABC):
 class Layout(Unknowns):
     """Each axis has its own machine.
 
-    Parameters
-    ----------
-    axes : tuple of ModalBlock
-    coefficients : int
-        Cutting coefficients whose scale is unknown.
-    clampings : int
-        Clampings whose tooth angle at the trigger's edge is unknown.
+    `coefficients`: cutting coefficients whose scale is unknown
+    `clampings`: clampings whose tooth angle at the trigger's edge is unknown
     """
 
     axes: tuple[ModalBlock, ...]
@@ -385,19 +376,11 @@ class Layout(Unknowns):
 class CoupledLayout(Unknowns):
     """Both planes are one machine.
 
-    Parameters
-    ----------
-    modes : int
-        Of the whole machine.
-    fixture : bool
-        Gap and fixture are two outputs; else their sum, the flange's own motion, is the only one.
-    softening : bool
-    skew : int
-        As in `ModalBlock`.
-    turning : int
-        1 where tool-holders have their gyroscopic moments, -1 where the spindle turns the other way, 0 where they have none.
-    coefficients, clampings : int
-        As in `Layout`.
+    `modes`: of the whole machine
+    `fixture`: gap and fixture are two outputs; else their sum, the flange's own motion, is the only one
+    `skew`: as in `ModalBlock`
+    `turning`: 1 where tool-holders have their gyroscopic moments, -1 where the spindle turns the other way, 0 where they have none
+    `coefficients`, `clampings`: as in `Layout`
     """
 
     modes: int
@@ -444,12 +427,7 @@ def flange_layout(*modes: int, places: int = 0) -> Layout:
 def prior_rows(layout: Unknowns, priors: Priors, coefficients: tuple[float, ...] = ()) -> PriorRows:
     """Return the priors of a layout's unknowns.
 
-    Parameters
-    ----------
-    layout : Unknowns
-    priors : Priors
-    coefficients : tuple of float
-        Standard deviations of the logarithms of the cutting coefficients' scales.
+    `coefficients`: standard deviations of the logarithms of the cutting coefficients' scales
     """
     centre, spread = np.zeros(layout.size), np.empty(layout.size)
     for block, place in zip(layout.blocks, layout.places, strict=True):

@@ -44,7 +44,7 @@ def cross(candidate, omega, flange, tip, measured="flange", gradient=False, x=No
     shapes = np.vstack([psi, residual.T])[:, : 2 + places].copy()
     m, n = omega_n.size, omega.size
     own, still = (np.ones(n), np.zeros(n)) if hammer is None else hit(omega)
-    points = np.column_stack([omega, relative_speed(omega) if x is None else np.full(n, x), own, still])
+    points = np.column_stack([omega, own, still, np.ones(n), relative_speed(omega) if x is None else np.full(n, x)])
     of_point = np.zeros((n, 3)) if hammer is None else hammer * (1.0 - own)[:, None]
     values, kept, turned = kernels.cross_frf(
         omega_n, shapes, factor, softening, joint, (shares, np.array(seen)), points, np.concatenate([flange, tip, of_point], axis=1)
@@ -253,7 +253,7 @@ def test_tool_holder_rows_weights_and_scales(measured):
     outputs = shares.shape[0]
     shapes = np.vstack([psi, residual.T])[:, : 1 + shares.shape[1]].copy()
     own = hit(omega)[0]
-    points = np.column_stack([omega, relative_speed(omega), own, np.zeros(7)])
+    points = np.column_stack([omega, own, np.zeros(7), np.ones(7)])
     direct = 1e-8 * (rng.standard_normal(7) + 1j * rng.standard_normal(7))
 
     def at(blocks):

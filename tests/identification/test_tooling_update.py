@@ -121,7 +121,9 @@ def of_one_tap(shop, clamped, drawn=None, cuts=None):
 def test_slopes_of_a_tap_are_those_of_its_residuals(shop, few):
     """By what the drawings do not tell: differences of two steps, whose error of second order is taken out."""
     data = of_one_tap(shop, shop.held_out, cuts=few)
-    layout = Layout((ModalBlock(3, 0, True, True), ModalBlock(2, 0, True, True)), len(data.coefficient_spread))
+    layout = Layout(
+        (ModalBlock(3, softening=True, standstill=True), ModalBlock(2, softening=True, standstill=True)), len(data.coefficient_spread)
+    )
     misfit = Misfit(data, Priors(), (0.02, 0.05))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     first, count = layout.force.start + data.rough_place.start, len(data.rough.unknowns)

@@ -18,7 +18,7 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
     """Return motion per tip force, shape (n, o), what `cross_frf_gradient` needs of the way there, and the slope that the flange's
     sensor sees, shape (n,).
 
-    B = psi^T (K - w^2 + i w factor factor^T)^-1 psi + R, K_ij = omega_i omega_j (delta_ij + x softening_ij);
+    B = psi^T (K - w^2 + i w factor factor^T)^-1 psi + R, K_ij = omega_i omega_j (delta_ij + sum over states of x softening_ij);
     output b (a row: the flange's own, or another place's, or what `shares` makes of them) answers g = b x with
     x = (A22 + K_joint^-1 + B)^-1 A21 e0. The flange's own row is [1 d] B, or on the holder's side of the joint [1 d] (B + K_joint^-1).
     A point of the tool-holder answers c + b x with b = -A_p2 and c its direct receptance, the machine's motion not being its own.
@@ -28,11 +28,12 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
     omega_n : (m,); factor : (m, m) lower triangular
     shapes : (m + 2, 2 + e) flange t, flange r, other places; psi, and behind it the residual: of the flange transposed, a lower
         triangular factor of R, of other places to the flange's t and r, as it is
-    softening : (m, m) symmetric, or (0, 0) where nothing changes with speed
+    softening : (s m, m) symmetric, one below the other for each state that the stiffness changes with, or (0, 0)
     joint : (4,) k_t, k_r, c_t, c_r, or (6,) with the shares by which natural frequencies and damping differ where the spindle stands still
     sensors : shares (o, 1 + e), what of the flange's motion and of the other places' is in each output; and (2,) of the flange's sensor its
         distance d behind the joint, and 1 where it looks at the holder, else 0
-    points : (n, 4) omega, x, 1 for motions of the machine and 0 for those of the tool-holder, 1 where the spindle stands still
+    points : (n, 4 + s) omega, 1 for motions of the machine and 0 for those of the tool-holder, 1 where the spindle stands still, factor on
+        the joint's stiffnesses, and x of each state
     holder : (n, 8) A22 tt, tr, rr, A21 e0 t, r, c and b of a point of the tool-holder (zeros for the machine's)
 
     What is kept, (blocks, m (2 + e) + 2 + 2 o, 2, BLOCK): real and imaginary parts of (K - w^2 + i w factor factor^T)^-1 psi by rows,
@@ -45,14 +46,14 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
     behind, front = seen
     kept = np.empty(((n + BLOCK - 1) // BLOCK, m * sides + 2 + 2 * outputs, 2, BLOCK))
     psi, residual = shapes[:m], shapes[m:].T
-    soft = softening.shape[0] > 0
+    states = softening.shape[0] // m if m else 0
     damping = factor @ factor.T
     static = residual.copy()
     static[0, 0], static[0, 1] = residual[0, 0] ** 2, residual[0, 0] * residual[1, 0]
     static[1, 0], static[1, 1] = static[0, 1], residual[1, 0] ** 2 + residual[1, 1] ** 2
     # the right sides stand below the matrix
     matrix = np.empty((m + sides, m, 2, BLOCK))
-    squared, turn, soften, stiffer = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    squared, turn, soften, stiffer = np.empty(BLOCK), np.empty(BLOCK), np.empty((states, BLOCK)), np.empty(BLOCK)
     machine = np.empty((sides, 2, 2, BLOCK))
     for block in range(kept.shape[0]):
         first = block * BLOCK
@@ -62,11 +63,14 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
             squared[f] = points[first + f, 0] ** 2
         for i in range(m):
             for j in range(i + 1):
-                bend = softening[i, j] * omega_n[i] * omega_n[j] if soft else 0.0
                 lost = damping[i, j]
                 real, imag = matrix[i, j, 0], matrix[i, j, 1]
                 for f in range(size):
-                    real[f] = bend * soften[f]
+                    real[f] = 0.0
+                for s in range(states):
+                    bend, x = softening[s * m + i, j] * omega_n[i] * omega_n[j], soften[s]
+                    for f in range(size):
+                        real[f] += bend * x[f]
                 for f in range(size):
                     imag[f] = lost * turn[f]
             square = omega_n[i] ** 2
@@ -92,10 +96,10 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
                         for f in range(size):
                             total[f] += shape * answer[f]
         for f in range(size):
-            w, own = points[first + f, 0], points[first + f, 2]
+            w, own, grip = points[first + f, 0], points[first + f, 1], points[first + f, 3]
             here = holder[first + f]
             b_tt, b_tr, b_rr = _at(machine[0, 0], f), _at(machine[0, 1], f), _at(machine[1, 1], f)
-            gives_t, gives_r = _reciprocal(complex(joint[0], w * joint[2])), _reciprocal(complex(joint[1], w * joint[3]))
+            gives_t, gives_r = _reciprocal(complex(grip * joint[0], w * joint[2])), _reciprocal(complex(grip * joint[1], w * joint[3]))
             e_tt = here[0] + gives_t + b_tt
             e_tr = here[1] + b_tr
             e_rr = here[2] + gives_r + b_rr
@@ -141,28 +145,29 @@ def cross_frf_gradient(omega_n, factor, softening, joint, sensors, points, kept,
     scale : (q,) by which that with each unknown is
 
     The rows: log omega_n (m), psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3),
-    of each other place psi's column (m) and its residual (2), with six of the joint what standing still changes (2), with softening
-    its lower triangle by rows, joint (4); where `out` has six more, A22's tt, tr, rr, A21 e0's t, r and c, where all points of the
+    of each other place psi's column (m) and its residual (2), with six of the joint what standing still changes (2), the lower
+    triangle of each state by rows, joint (4); where `out` has six more, A22's tt, tr, rr, A21 e0's t, r and c, where all points of the
     tool-holder are the tip: b = -A21 e0 changes with the latter two.
     """
     m, n = omega_n.size, points.shape[0]
     shares, seen = sensors
     outputs, sides = shares.shape[0], 1 + shares.shape[1]
     pairs = m * (m + 1) // 2
-    soft, stills = softening.shape[0] > 0, joint.size == 6
-    bend = np.zeros((m, m))
-    if soft:
+    states, stills = (softening.shape[0] // m if m else 0), joint.size == 6
+    bend = np.empty((states, m, m))
+    for s in range(states):
         for i in range(m):
             for j in range(m):
-                bend[i, j] = softening[i, j] * omega_n[i] * omega_n[j]
+                bend[s, i, j] = softening[s * m + i, j] * omega_n[i] * omega_n[j]
     shape = (m, 2, BLOCK)
     q, lq, kq, p, lp, kp = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
+    rest = np.empty(shape)
     v, y = np.empty((2, 2, BLOCK)), np.empty((2, 2, BLOCK))
     moved = np.empty((sides - 2, 2, BLOCK))
     spare, away, none, unit = np.empty((2, BLOCK)), np.empty((2, BLOCK)), np.zeros((2, BLOCK)), np.zeros((2, BLOCK))
     unit[0] = 1.0
     flexible, still, sums = np.empty((4, 2, BLOCK)), np.empty((2, 2, BLOCK)), np.empty((2, 2, BLOCK))
-    turn, soften, stiffer = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    turn, soften, stiffer = np.empty(BLOCK), np.empty((states, BLOCK)), np.empty(BLOCK)
     for block in range(kept.shape[0]):
         first = block * BLOCK
         size = min(BLOCK, n - first)
@@ -173,7 +178,7 @@ def cross_frf_gradient(omega_n, factor, softening, joint, sensors, points, kept,
         for i in range(m):
             _products(here[i * sides], x0, here[i * sides + 1], x1, 1.0, q[i, 0], q[i, 1], size)
         _combine(factor, q, lq, size)
-        _stiffness(omega_n, bend, soften, stiffer, q, kq, size)
+        _stiffness(omega_n, bend, soften, stiffer, q, kq, rest, size)
         for o in range(outputs):
             start = first * outputs + o
             _output_rows(
@@ -193,7 +198,7 @@ def cross_frf_gradient(omega_n, factor, softening, joint, sensors, points, kept,
                 for a in range(2, sides):
                     _add_product(here[i * sides + a], moved[a - 2], p[i], size)
             _combine(factor, p, lp, size)
-            _stiffness(omega_n, bend, soften, stiffer, p, kp, size)
+            _stiffness(omega_n, bend, soften, stiffer, p, kp, rest, size)
             for i in range(m):
                 k = m + 2 * i
                 _line(p[i], kq[i], kp[i], q[i], -scale[i], out[i], start, outputs, spare, size)
@@ -220,10 +225,10 @@ def cross_frf_gradient(omega_n, factor, softening, joint, sensors, points, kept,
                 for a in range(2):
                     _line(sums[a], still[a], none, x0, scale[k], out[k], start, outputs, spare, size)
                     k += 1
-            if soft:
+            for s in range(states):
                 # the omegas' rows are done with it
                 for i in range(m):
-                    _times(p[i], soften, kp[i], size)
+                    _times(p[i], soften[s], kp[i], size)
                 for i in range(m):
                     for j in range(i + 1):
                         share = -omega_n[i] * omega_n[j] * scale[k] * (0.5 if i == j else 1.0)
@@ -345,15 +350,22 @@ def _combine(coefficients, rows, out, size):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _stiffness(omega_n, bend, soften, stiffer, rows, out, size):
+def _stiffness(omega_n, bend, soften, stiffer, rows, out, rest, size):
     """out = K rows."""
-    _combine(bend, rows, out, size)
     for i in range(omega_n.size):
         square = omega_n[i] ** 2
         for part in range(2):
             row, total = rows[i, part], out[i, part]
             for f in range(size):
-                total[f] = soften[f] * total[f] + square * stiffer[f] * row[f]
+                total[f] = square * stiffer[f] * row[f]
+    for s in range(bend.shape[0]):
+        _combine(bend[s], rows, rest, size)
+        x = soften[s]
+        for i in range(omega_n.size):
+            for part in range(2):
+                more, total = rest[i, part], out[i, part]
+                for f in range(size):
+                    total[f] += x[f] * more[f]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -380,10 +392,11 @@ def _quarter_turn(row, turn, spare, size):
 def _speed_rows(points, joint, first, size, turn, soften, stiffer):
     """What stands before the damping, before what softens and before the stiffness: w, x and 1, or more where the spindle stands still."""
     for f in range(size):
-        w, x, still = points[first + f, 0], points[first + f, 1], points[first + f, 3]
+        w, still = points[first + f, 0], points[first + f, 2]
         share = 1.0 + still * joint[4] if joint.size == 6 else 1.0
         stiffer[f] = share * share
-        soften[f] = x * stiffer[f]
+        for s in range(soften.shape[0]):
+            soften[s, f] = points[first + f, 4 + s] * stiffer[f]
         turn[f] = w * (1.0 + still * joint[5]) if joint.size == 6 else w
 
 
@@ -394,7 +407,7 @@ def _output_rows(kept, shares, behind, points, weight, direct, size, answers, mo
     """
     v, y = answers
     for f in range(size):
-        own, by = points[f, 2], weight[f]
+        own, by = points[f, 1], weight[f]
         for a in range(2):
             answer = _at(kept[a], f) * by
             _put(y[a], f, answer)
@@ -408,11 +421,11 @@ def _output_rows(kept, shares, behind, points, weight, direct, size, answers, mo
 def _flexibility_rows(points, joint, first, size, flexible, still):
     """How the joint's flexibility falls with its stiffnesses and dampings; what standing still does to stiffness and damping."""
     for f in range(size):
-        w, stands = points[first + f, 0], points[first + f, 3]
+        w, stands, grip = points[first + f, 0], points[first + f, 2], points[first + f, 3]
         for a in range(2):
-            inverse = _reciprocal(complex(joint[a], w * joint[2 + a]))
+            inverse = _reciprocal(complex(grip * joint[a], w * joint[2 + a]))
             inverse *= inverse
-            _put(flexible[a], f, inverse)
+            _put(flexible[a], f, grip * inverse)
             _put(flexible[2 + a], f, complex(0.0, w) * inverse)
         if joint.size == 6:
             _put(still[0], f, complex(-2.0 * stands / (1.0 + stands * joint[4]), 0.0))

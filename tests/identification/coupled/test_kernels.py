@@ -231,7 +231,7 @@ def test_a_change_of_the_flange_moves_a_line_by_what_it_feels(outputs, seen):
 @pytest.mark.parametrize("softening", [False, True])
 @pytest.mark.parametrize("outputs", [1, 2])
 def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(outputs, softening):
-    layout = Layout((ModalBlock(3, outputs - 1, softening), ModalBlock(2, outputs - 1, softening)))
+    layout = Layout((ModalBlock(3, outputs - 1, softening=softening), ModalBlock(2, outputs - 1, softening=softening)))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     joint = scaled_joint(theta[layout.joint])
     at = points(9, symmetric=True)
@@ -249,7 +249,7 @@ def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(o
         holder = np.zeros((own.size, 8), dtype=complex)
         holder[:, :5] = np.stack([block[:, 0, 0], block[:, 0, 1], block[:, 1, 1], at.tip[own, d, i], at.tip[own, d + 1, i]], axis=1)
         size, half = layout.axes[i].size + 4, own.size * outputs
-        points_of = np.stack([at.omega[own], at.x[own], np.ones(own.size), np.zeros(own.size)], axis=1)
+        points_of = np.stack([at.omega[own], np.ones(own.size), np.zeros(own.size), np.ones(own.size), at.x[own]], axis=1)
         shares = FLANGE_ALONE if outputs == 1 else GAP_AND_FIXTURE
         seen = ELSEWHERE[i].copy()
         machine = plane_of.omega_n, plane_of.shapes, plane_of.factor, plane_of.softening, joint
