@@ -161,9 +161,9 @@ class Fit(ABC):
         reasons = [*because(self.causes), *reasons, *not_as_predicted(self.predictions)]
         if not validated(self.predictions):
             notes = [not_judged(self.predictions), *notes]
-        notes = [*learned(data, solution), *notes]
         if not data.distance_told and len(self._compared) < ENOUGH_FOR_DISTANCE:
             notes = [Remark(IdentificationCode.DISTANCE_UNTOLD, DISTANCE_UNTOLD), *notes]
+        notes = [*learned(data, solution), *notes]
         if 2 * data.swept_cuts > data.cuts:
             reasons = [*reasons, Remark(IdentificationCode.MOSTLY_PASSES, MOSTLY_PASSES)]
         # wider bands do not make less known than was known before

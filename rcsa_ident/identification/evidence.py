@@ -115,8 +115,8 @@ class EvidenceSelection:
                 found = self._agreed(data, found, sequence, map, trace, progress)
             if data.sweeps:
                 found = self._asked(data, found, map, _report_to(BOTH, trace, progress))
-            assert isinstance(found, PlaneFit | CoupledFit)
             if whole is not data:
+                assert isinstance(found, PlaneFit | CoupledFit)
                 found = replace(found, whole=whole)
             if isinstance(found, PlaneFit) and not data.sweeps and not data.tests and data.rough is None:
                 found = self._freed(found, whole, sequence, map, trace, progress)
