@@ -93,7 +93,7 @@ def passive(
     def vectorised() -> np.ndarray:
         stiffness = np.broadcast_to(np.diag(omega_n**2), (n, m, m)).copy()
         if softening.size:
-            stiffness += points[:, 1, None, None] * softening * np.outer(omega_n, omega_n)
+            stiffness += points[:, 4, None, None] * softening * np.outer(omega_n, omega_n)
         dynamic = stiffness + 1j * omega[:, None, None] * (factor @ factor.T)
         dynamic[:, np.arange(m), np.arange(m)] -= omega[:, None] ** 2
         u = np.linalg.solve(dynamic, np.broadcast_to(psi[:, :2].astype(complex), (n, m, 2)))
