@@ -45,7 +45,7 @@ from rcsa_ident.tool_holder.drawings import KnownToolings
 #: Factor on the posterior's standard deviations for what no model of finitely many modes can tell of itself: on three virtual
 #: machines drawn for development (`benchmarks.machines`), the errors' root mean square was that many deviations. Of both planes together,
 #: on three coupled ones, it was 1.5; 1.7 makes the 90 % band hold as much.
-#: With a stiffness that warms up it was 2.1 on the three that were drawn for that (`benchmarks.ideals`, seeds 7101 to 7103).
+#: With a stiffness that warms up, 90 % bands of 1.4 held 67 to 97 % on three machines (`benchmarks.ideals`, seeds 7101 to 7103).
 WIDER, WIDER_TOGETHER, WIDER_WARMING = 1.4, 1.7, 2.1
 #: Share of the largest motion above which it is told how much of it the other axis' force makes.
 LARGE = 0.3

@@ -104,7 +104,7 @@ class Queue extends EventTarget {
   }
 }
 
-/** Send a body with its progress, which fetch does not tell; returns the answer's `Upload-Offset`. */
+/** Send a body and report its progress, which fetch cannot; returns the answer's `Upload-Offset`. */
 function sent(method, path, body, headers, progress) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
@@ -112,13 +112,13 @@ function sent(method, path, body, headers, progress) {
     for (const [name, value] of Object.entries({ ...keyHeaders(), ...headers })) request.setRequestHeader(name, value);
     request.upload.onprogress = (event) => progress(event.loaded);
     request.onload = () => {
-      const told = new Headers();
+      const answered = new Headers();
       for (const name of ["retry-after", "upload-offset"]) {
         const value = request.getResponseHeader(name);
-        if (value !== null) told.set(name, value);
+        if (value !== null) answered.set(name, value);
       }
-      if (request.status >= 200 && request.status < 300) resolve(Number(told.get("upload-offset")));
-      else reject(problemOf(request.status, request.responseText, told));
+      if (request.status >= 200 && request.status < 300) resolve(Number(answered.get("upload-offset")));
+      else reject(problemOf(request.status, request.responseText, answered));
     };
     request.onerror = () => reject(problemOf(0, ""));
     request.send(body);
