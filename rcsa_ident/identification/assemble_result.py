@@ -343,7 +343,11 @@ def _told(layout: Layout, i: int, steady: float) -> tuple[FloatArray, ModalBlock
 
 @dataclass(frozen=True, eq=False)
 class CoupledFit(Fit):
-    """Both planes as one machine. `coupling`: what spoke against planes that feel nothing of each other."""
+    """Both planes as one machine.
+
+    `coupling`: what spoke against planes that feel nothing of each other
+    `freed_of`: what was learned of the lines before, and taken from them
+    """
 
     data: IdentificationData
     points: CoupledData
@@ -352,6 +356,7 @@ class CoupledFit(Fit):
     misfit: Misfit
     rival: Solution
     whole: IdentificationData | None = None
+    freed_of: tuple[Remark, ...] = ()
 
     @property
     def wider(self) -> float:
@@ -395,7 +400,7 @@ class CoupledFit(Fit):
             told.append(Remark(IdentificationCode.HOUSING_LEFT_OUT, HOUSING_LEFT_OUT))
         if self._gain_of_another_feed() > WORTH:
             told.append(Remark(IdentificationCode.ONE_FEED, ANOTHER_FEED))
-        return reasons, [*told, *found]
+        return reasons, [*self.freed_of, *told, *found]
 
     def _turned(self) -> float:
         """By how much the mode that is turned most is turned out of X and Y [rad]."""

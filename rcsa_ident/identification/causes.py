@@ -13,19 +13,18 @@ twice the logarithm of how much likelier the lines are with the cause than witho
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.data import LEVER, IdentificationData
-from rcsa_ident.identification.further_unknowns import CutScales, Further, Grips, OrderFactors, Warming, order_factors, warmth
-from rcsa_ident.identification.levenberg_marquardt import Solution, refine
+from rcsa_ident.identification.further_unknowns import CutScales, Further, Grips, Warming, order_factors, warmth
+from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.linearisation import Linearisation, Residual
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.model_order import cut_weights, evidence, model_error
-from rcsa_ident.identification.unknowns import JOINT, planes
+from rcsa_ident.identification.unknowns import JOINT
 
 #: Steps of a polish with further unknowns, and how often the noise is learned anew.
 _STEPS, _NOISES = 60, 3
@@ -151,24 +150,6 @@ def further_unknowns(found: Explanation, data: IdentificationData) -> Further | 
         case _:
             return None
     return None if any(isinstance(each, type(more)) for each in data.further) else more
-
-
-def with_orders(solution: Solution, misfit: Misfit) -> float:
-    """Return minus twice the log evidence of an answer [-], with factors on the forces of the teeth's orders where that is likelier."""
-    if any(isinstance(each, OrderFactors) for each in misfit.data.further):
-        return evidence(solution, misfit)
-    alike = replace(misfit.data, made=replace(misfit.data.made, kind=np.zeros_like(misfit.data.made.kind)))
-    layout, data = planes(solution.layout), replace(order_factors(alike), spread=_ORDER).on(alike)
-    count = len(data.coefficient_spread) - layout.coefficients
-    more = replace(layout, coefficients=layout.coefficients + count)
-    further = misfit.with_data(data, misfit.cut_weight)
-    start = np.insert(solution.theta, layout.force.stop, np.zeros(count))
-    found = refine(further, start, more, solution.evaluation.nuisance, _STEPS)
-    for _ in range(_NOISES):
-        # with the right forces less is left unexplained
-        further = misfit.with_data(data, cut_weights(found, further), model_error(found, further))
-        found = refine(further, found.theta, more, found.evaluation.nuisance, _STEPS)
-    return min(evidence(solution, misfit), evidence(found, further))
 
 
 def _bordered(

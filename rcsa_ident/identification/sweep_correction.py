@@ -1,4 +1,4 @@
-"""Lines of a spindle whose speed changes: what a machine answers to a force that sweeps, and to one that does not.
+"""Lines of a spindle whose speed changes, and of a machine that does: what it answers in one state, over what it answers in another.
 
 A force F e^{i m theta} of a spindle at speed Omega that gains A moves the flange by F e^{i m theta} (H - (i/2) m A H'') to first order in
 A, both at omega = m Omega: in the response's integral over the past e^{i m (theta(t - s) - theta(t))} is e^{-i omega s} (1 + (i/2) m A
@@ -15,9 +15,11 @@ import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.data import AxisData, IdentificationData
+from rcsa_ident.identification.further_unknowns import further_places
+from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.priors import Priors
-from rcsa_ident.identification.unknowns import Unknowns, planes
+from rcsa_ident.identification.unknowns import Layout, Unknowns, pack, planes, unpack
 
 #: Weights of a mean over an interval at its middle and, together, at `data.NODE` of its half to both sides: exact to the fifth power.
 _MIDDLE, _SIDES = 8.0 / 18.0, 10.0 / 18.0
@@ -39,6 +41,79 @@ def unswept(data: IdentificationData, priors: Priors, theta: FloatArray, layout:
     middle, low, high = (Misfit(_moved(data, side), priors, (0.0,) * len(data.axes)).models(theta, layout) for side in (0, -1, 1))
     ratios = [_ratio(axis, *each) for axis, *each in zip(data.axes, middle, low, high, strict=True)]
     return replace(data, axes=tuple(_divided(axis, ratio) for axis, ratio in zip(data.axes, ratios, strict=True)))
+
+
+def without_further(data: IdentificationData, priors: Priors, found: Solution) -> IdentificationData:
+    """Return the data as a machine would give them that is warm at each speed, clamped alike, and cut with forces that are known.
+
+    `data`: with further unknowns, without smooth errors
+    `found`: of these data or of some of their cuts; what was learned
+    """
+    first, count = further_places(data)[0][1].start, len(data.coefficient_spread)
+    layout = replace(planes(found.layout), coefficients=count, clampings=0)
+    theta = found.theta[: layout.size]
+    logs = theta[layout.force].copy()
+    logs[:first] = 0.0
+    alike = theta.copy()
+    alike[layout.force][first:] = 0.0
+    warm = replace(data, warmth=data.steady * data.relative_speed if data.warmth.size else data.warmth)
+    shares = (0.0,) * len(data.axes)
+    here, there = Misfit(data, priors, shares).models(theta, layout), Misfit(warm, priors, shares).models(alike, layout)
+    forces = [np.exp(axis.force_slope @ logs) for axis in data.axes]
+    axes = []
+    for i, axis in enumerate(data.axes):
+        ratio = here[i] / there[i]
+        across = axis.across
+        if across.size:
+            across = across * _at_lines(data.axes[1 - i], forces[1 - i], axis)
+        axes.append(
+            replace(
+                axis,
+                lines=axis.lines / ratio[:, :, None],
+                talk=axis.talk / ratio[:, :, None] if axis.talk.size else axis.talk,
+                variance=axis.variance / np.abs(ratio) ** 2,
+                force_slope=axis.force_slope[:, :first],
+                force=axis.force * forces[i] if axis.force.size else axis.force,
+                across=across,
+                across_slope=axis.across_slope[:, :first],
+            )
+        )
+    return replace(
+        data,
+        axes=tuple(axes),
+        coefficient_spread=data.coefficient_spread[:first],
+        further=(),
+        warmth=np.zeros(0),
+        course=np.zeros((0, 0)),
+        steady=0.0,
+        grip=np.zeros(0, dtype=np.intp),
+    )
+
+
+def start_without_further(data: IdentificationData, found: Solution) -> tuple[FloatArray, Layout, FloatArray]:
+    """Return where the fit of `without_further` with smooth errors begins: its unknowns, their layout, and the cuts' delays and angles."""
+    learned, old = slice(further_places(data)[0][1].start, len(data.coefficient_spread)), planes(found.layout)
+    blocks, parts = [], []
+    for own, block in zip(old.places, old.axes, strict=True):
+        machine = unpack(found.theta[own], block)
+        warms = block.warming and data.steady != 0.0
+        if warms:
+            machine = replace(machine, softening=data.steady * machine.warming + (machine.softening if block.softening else 0.0))
+        blocks.append(replace(block, warming=False, softening=block.softening or warms))
+        parts.append(pack(machine, blocks[-1]))
+    layout = replace(old, axes=tuple(blocks), coefficients=old.coefficients - (learned.stop - learned.start))
+    parts += [found.theta[old.joint], np.delete(found.theta[old.force], learned), found.theta[old.force.stop :]]
+    return np.concatenate(parts), layout, found.evaluation.nuisance
+
+
+def _at_lines(other: AxisData, values: ComplexArray, axis: AxisData) -> ComplexArray:
+    """Values of another axis' lines at the lines of an axis, by cut and order; 1 where it has none there."""
+    known = dict(zip(_keys(other), values.tolist(), strict=True))
+    return np.array([known.get(key, 1.0) for key in _keys(axis)])
+
+
+def _keys(axis: AxisData) -> list[tuple[int, int]]:
+    return list(zip(axis.cut.tolist(), np.rint(axis.order).astype(int).tolist(), strict=True))
 
 
 def _moved(data: IdentificationData, side: int) -> IdentificationData:

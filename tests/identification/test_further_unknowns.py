@@ -18,10 +18,12 @@ from rcsa_ident.identification.further_unknowns import (
     order_factors,
     warmth,
 )
+from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.made_cuts import USUAL_PAUSE
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.sweep_correction import start_without_further, without_further
 from rcsa_ident.identification.unknowns import JOINT, Layout, ModalBlock, pack, unpack
 from tests.identification.models import vector_of
 
@@ -175,3 +177,30 @@ def test_like_cuts_share_their_factors(few):
     slope = axis.force_slope[:, place]
     assert np.all(np.sum(slope != 0.0, axis=1) == 2)
     np.testing.assert_array_equal(np.sum(slope, axis=1), 1.0 + 1.0j)
+
+
+@pytest.mark.parametrize("constant", [900.0, None])
+def test_lines_freed_of_what_was_learned_are_those_of_the_warm_machine(few, constant):
+    data = all_of(few, constant)
+    theta, layout = changing(data)
+    models = Misfit(data, Priors(), (1e-2, 1e-2)).models(theta, layout)
+    axes = []
+    for axis, model in zip(data.axes, models, strict=True):
+        pushed = {"force": np.ones(axis.omega.size), "across": np.full(axis.omega.size, 2.0 + 1.0j)}
+        axes.append(replace(axis, lines=np.stack([model, np.zeros_like(model)], axis=2), **pushed))
+    made = replace(data, axes=tuple(axes))
+    nuisance = np.zeros((len(data.cut_ids), 2))
+    found = Solution(theta, layout, Misfit(made, Priors(), (1e-2, 1e-2)).evaluate(theta, layout, nuisance), True, 0)
+    freed = without_further(made, Priors(), found)
+    assert freed.further == ()
+    assert freed.coefficient_spread == few.coefficient_spread
+    start, known, _ = start_without_further(made, found)
+    for axis, model in zip(freed.axes, Misfit(freed, Priors(), (1e-2, 1e-2)).models(start, known), strict=True):
+        # a warmth of exactly nothing counts as 1e-9
+        np.testing.assert_allclose(axis.lines[:, :, 0], model, rtol=1e-8)
+    # what pushed across in the same lines is corrected as what pushed along in those of the other axis
+    x, y = freed.axes
+    beside = dict(zip(zip(y.cut.tolist(), y.order.tolist(), strict=True), y.force, strict=True))
+    expected = [(2.0 + 1.0j) * beside[key] for key in zip(x.cut.tolist(), x.order.tolist(), strict=True)]
+    np.testing.assert_allclose(x.across, expected, rtol=1e-12)
+    assert np.ptp(np.abs(x.across)) > 0.01
