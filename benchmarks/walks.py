@@ -1,12 +1,12 @@
 """How straight three walks through the house are: rooms, climbs and returns of the project's own calls.
 
-``python -m benchmarks walks [--rooms]`` runs a tooling in a REST body → lobes, recordings → identification, and a cut → forces, each in a
+``python -m benchmarks walks [--whole] [--rooms]`` runs a tooling in a REST body → lobes, recordings → identification, and a cut → forces, each in a
 process of its own, and listens to every call. What is counted, so that neither the number of cuts nor that of iterations matters:
 
 - A walk is the project's functions in the order in which each is called for the first time. What an import calls is none of it, and
   neither are rooms under ``dynamics``, which hold what all others share.
 - A room is a folder of modules, as `rcsa_ident.identification.coupled`; kernels belong to the room that keeps them, and a module that
-  stands in no folder is a room.
+  stands in no folder is a room. With ``--whole`` a room within a room is part of that: so folders that were divided in between compare.
 - A stop is a stretch of the walk in one room. A climb leads from a stop to one on a higher floor: floors are the layers of the import
   contracts, those of the service above the library's. A return leads to a room that the walk has been in before.
 - An upward call is a function whose first caller stands on a lower floor: what was handed down is called from there.
@@ -176,9 +176,11 @@ def _of_command(*words: str) -> list[Call]:
     return list(found.values())
 
 
-def walked(walk: Callable[[Path], list[Call]], folder: Path) -> Walk:
-    """Return what is counted of a walk."""
+def walked(walk: Callable[[Path], list[Call]], folder: Path, whole: bool) -> Walk:
+    """Return what is counted of a walk. `whole`: a room within a room is part of that."""
     calls = walk(folder)
+    if whole:
+        calls = [each._replace(room=".".join(each.room.split(".")[:2])) for each in calls]
     upward = sum(bool(each.caller) and floor_of(each.room) > floor_of(each.caller) for each in calls)
     return Walk(str(walk.__doc__).rstrip("."), len(calls), upward, tuple(room for room, _ in groupby(each.room for each in calls)))
 
@@ -186,13 +188,14 @@ def walked(walk: Callable[[Path], list[Call]], folder: Path) -> Walk:
 def main(arguments: Sequence[str]) -> None:
     """Walk, and print a row each."""
     parser = argparse.ArgumentParser(prog="benchmarks walks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--whole", action="store_true", help="a room within a room is part of that")
     parser.add_argument("--rooms", action="store_true", help="print the stops, too")
     asked = parser.parse_args(arguments)
     print("| walk | functions | stops | rooms | climbs | returns | upward calls |\n|---|---|---|---|---|---|---|")
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory() as kept, ProcessPoolExecutor(1, context, max_tasks_per_child=1) as pool:
         for walk in WALKS:
-            found = pool.submit(walked, walk, Path(kept)).result()
+            found = pool.submit(walked, walk, Path(kept), asked.whole).result()
             counts = (found.functions, len(found.stops), found.rooms, found.climbs, found.returns, found.upward)
             print("|", " | ".join([found.name, *map(str, counts)]), "|", flush=True)
             if asked.rooms:

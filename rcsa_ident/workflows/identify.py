@@ -150,11 +150,7 @@ def identify(
     `tests`: as `hammer_lines` returns them
     Raises `InputError` if no cut is usable, and there is no hammer test; or of a robot's cuts at several postures.
     """
-    _at_one_posture(campaign)
-    found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings)
-    clock = clock_remark(readings)
-    said = tuple(dict.fromkeys([*(remark for test in tests for remark in test.remarks), *([] if clock is None else [clock])]))
-    return replace(found, notes=(*found.notes, *said)) if said else found
+    return of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings, tests)
 
 
 def _at_one_posture(campaign: Campaign) -> None:
@@ -193,13 +189,17 @@ def clock_remark(readings: Sequence[Reading]) -> Remark | None:
     return Remark(RecordCode.CLOCK, words)
 
 
-def of_campaign(found: Identification, campaign: Campaign, readings: Sequence[Reading] = ()) -> Identification:
+def of_campaign(
+    found: Identification, campaign: Campaign, readings: Sequence[Reading] = (), tests: Sequence[HammerLines] = ()
+) -> Identification:
     """Return the identification with what its machine has to know of the campaign, what is unusual about that, and shapes of cutters; and
     with what gives way on the workpiece's side, where the readings tell it.
     """
     side, told = workpiece_side(found, [each for reading in readings for each in reading.measurements], campaign.sensors)
     exact = () if found.toolings is not None or not campaign.rough else (Remark(IdentificationCode.DRAWINGS_EXACT, DRAWINGS_EXACT),)
-    notes = tuple(dict.fromkeys((*found.notes, *exact, *told, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
+    clock = clock_remark(readings)
+    said = (*(remark for test in tests for remark in test.remarks), *(() if clock is None else (clock,)))
+    notes = tuple(dict.fromkeys((*found.notes, *exact, *told, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids), *said)))
     drawings = {name: tooling.drawing for name, tooling in campaign.toolings.items()}
     values = () if found.toolings is None else learned(found.toolings, drawings)
     known = replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=values)
@@ -247,14 +247,15 @@ def _mode_deviation(
     return deviation(frequency), deviation(damping)
 
 
-def data_of(
-    campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = (), at_flange: bool = False
-) -> IdentificationData:
+def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = (), robot: bool = False) -> IdentificationData:
     """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them, which take these as drawn.
 
-    `at_flange`: whether the flange's sensors look at the flange itself, whatever the campaign tells of them
+    `robot`: whether the cuts may have several postures; the flange's sensors look at the flange itself then
+    Raises `InputError` if no cut is usable, and there is no hammer test; or of cuts at several postures.
     """
-    cuts = _data_of_cuts(campaign, readings, tests, at_flange)
+    if not robot:
+        _at_one_posture(campaign)
+    cuts = _data_of_cuts(campaign, readings, tests, robot)
     return with_tests(cuts, tests, _at_points(campaign)) if tests else with_rough(cuts, campaign)
 
 
@@ -270,7 +271,7 @@ def _at_points(campaign: Campaign) -> dict[str, AtPoints]:
 
 
 def _data_of_cuts(
-    campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines], at_flange: bool = False
+    campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines], robot: bool = False
 ) -> IdentificationData | None:
     """The cuts alone; None where no cut is usable but there are tests."""
     measurements = [measurement for each in readings for measurement in each.measurements]
@@ -289,7 +290,7 @@ def _data_of_cuts(
     sensors = _displacements(campaign, data)
     # where nobody tells it the flange itself is believed, and the lines are asked what they say to that
     told = [(0.0, 0.0) if s is None or s.distance is None else (s.distance, s.distance_spread) for s in sensors]
-    data = data if at_flange else with_distances(data, *np.array(told).reshape(-1, 2).T)
+    data = data if robot else with_distances(data, *np.array(told).reshape(-1, 2).T)
     known_places = not data.of_flange or all(s is not None and s.distance is not None for s in sensors)
     made = _made(campaign, [each.cut_id for each in readings for _ in each.measurements])
     if np.all(made.judged):

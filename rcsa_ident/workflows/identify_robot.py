@@ -59,7 +59,7 @@ def robot_data(campaign: Campaign, readings: Sequence[Reading], robot: FlexibleR
     if campaign.rough:
         campaign = replace(campaign, toolings={name: replace(tooling, spread=EXACT) for name, tooling in campaign.toolings.items()})
     _check_sensors(campaign)
-    data = data_of(campaign, readings, at_flange=True).learned_from()
+    data = data_of(campaign, readings, robot=True).learned_from()
     beside = _Beside(campaign, data)
     postures, of_cut = check_postures([beside.cuts[id].posture for id in data.cut_ids], data.cut_ids, robot.model)
     teeth = {name: tooling.cutter.teeth for name, tooling in campaign.toolings.items()}
