@@ -1,7 +1,8 @@
 """How straight three walks through the house are: rooms, climbs and returns of the project's own calls.
 
-``python -m benchmarks walks [--whole] [--rooms]`` runs a tooling in a REST body → lobes, recordings → identification, and a cut → forces, each in a
-process of its own, and listens to every call. What is counted, so that neither the number of cuts nor that of iterations matters:
+``python -m benchmarks walks [--whole] [--rooms]`` runs a tooling in a REST body → lobes, recordings → identification, and a cut → forces,
+each in a process of its own, and listens to every call. What is counted, so that neither the number of cuts nor that of iterations
+matters:
 
 - A walk is the project's functions in the order in which each is called for the first time. What an import calls is none of it, and
   neither are rooms under ``dynamics``, which hold what all others share.
