@@ -80,6 +80,7 @@ STUDIES = (
     "physics_pictures",
     "compile",
     "frozen",
+    "walks",
 )
 
 

@@ -49,6 +49,9 @@ polish of SciPy gets its derivatives from differences, ours in closed form. Sear
 (`python -m benchmarks search_trace`), robots beside Gaussian processes in [robots.md](robots.md), readers of long recordings in
 `python -m benchmarks reading`, whole services in [service.md](service.md). There is no public program for stability lobes of milling in
 Python: the peer there is the dense form that all published codes share.
+
+What has no peer: `python -m benchmarks walks` counts how straight the code itself is, from a tooling in a REST body to lobes, from
+recordings to an identification, and from a cut to forces: the rooms that each walk enters, climbs to a higher floor, and returns.
 """
 
 

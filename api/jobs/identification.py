@@ -67,10 +67,11 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     readings = _readings(campaign, read, context)
     if robot is not None:
         return _of_robot(robot, campaign, readings, request["seed"], context, spread)
-    data = data_of(campaign, readings, hammer_lines(campaign, partial(anonymous, read_test)))
+    tests = hammer_lines(campaign, partial(anonymous, read_test))
+    data = data_of(campaign, readings, tests)
     story = _Story(context, Preview(data), datetime.fromisoformat(str(job.started)))
     found = _method(request["method"], start).run(data, request["seed"], _Remembering(context, spread), story)
-    found = of_campaign(found, campaign, readings)
+    found = of_campaign(found, campaign, readings, tests)
     context.progress("result", 0, 1)
     deviations = mode_deviations(found)
     content = plain(identification_to_json(found, campaign, left_out(readings), deviations))

@@ -17,12 +17,17 @@ from rcsa_ident.tool_holder.rough import RoughToolHolder
 LEAST_SPREAD = 1e-5
 
 
-def with_scales(data: IdentificationData, depth: FloatArray, gain: FloatArray, delay: FloatArray) -> IdentificationData:
-    """Return the same data whose forces may be off by a factor of each tooling, its depth, and motions by gain and delay of each axis.
+def with_rough_cuts(
+    data: IdentificationData, depth: FloatArray, gain: FloatArray, delay: FloatArray, talk: FloatArray, corners: Sequence[ComplexArray] = ()
+) -> IdentificationData:
+    """Return the same data whose forces and motions may be wrong by what is not known exactly; deviations are 0 where it is.
 
-    `depth` [-], shape (toolings,): standard deviation of the logarithm of each tooling's axial depth; 0 where it is known exactly
+    `depth` [-], shape (toolings,): standard deviation of the logarithm of each tooling's axial depth
     `gain` [-], shape (axes,): of that of each axis' sensor's gain
     `delay` [s], shape (axes,): of each axis' sensor's delay
+    `talk` [-], shape (axes,): of the share of the other axis' motion that each axis' displacement sensor feels
+    `corners`: sequence of complex array, one an axis, shape (n, c); by what the logarithm of each line's force changes with a corner radius
+        that is larger by its standard deviation
     """
     deep, loud, late = (np.flatnonzero(each) for each in (depth, gain, delay))
     columns = []
@@ -30,31 +35,14 @@ def with_scales(data: IdentificationData, depth: FloatArray, gain: FloatArray, d
         of_tooling = data.cut_tooling[axis.cut][:, None] == deep
         own = np.broadcast_to(i == loud, (axis.omega.size, loud.size))
         lagging = -1j * axis.omega[:, None] * delay[late] * (i == late)
-        columns.append(np.hstack([of_tooling, own, lagging]))
-    # a delay stands in units of its spread
-    return data.with_unknowns((*depth[deep].tolist(), *gain[loud].tolist(), *(1.0,) * late.size), columns)
+        columns.append(np.hstack([of_tooling, own, lagging, *corners[i : i + 1]]))
+    # a delay and a corner radius stand in units of their spreads
+    units = (1.0,) * (columns[0].shape[1] - deep.size - loud.size)
+    return _with_rough_forces(_with_cross_talk(data.with_unknowns((*depth[deep].tolist(), *gain[loud].tolist(), *units), columns), talk))
 
 
-def with_corners(data: IdentificationData, owners: Sequence[str], changes: Sequence[ComplexArray]) -> IdentificationData:
-    """Return the same data whose cutters may have other corner radii than told.
-
-    `owners`: sequence of str, length of the data's toolings; tools of one model have one corner radius; empty where it is known exactly
-    `changes`: sequence of complex array, one an axis, shape (n,); logarithms of the ratio of each line's force with a corner radius that is
-        larger by its standard deviation
-    """
-    unknowns = [owner for owner in dict.fromkeys(owners) if owner]
-    if not unknowns:
-        return data
-    owned = np.array([owner == each for owner in owners for each in unknowns]).reshape(len(owners), -1)
-    columns = [owned[data.cut_tooling[axis.cut]] * change[:, None] for axis, change in zip(data.axes, changes, strict=True)]
-    return data.with_unknowns((1.0,) * len(unknowns), columns)
-
-
-def with_cross_talk(data: IdentificationData, spread: FloatArray) -> IdentificationData:
-    """Return the same data whose displacement sensors may feel a share of the other axis' motion.
-
-    `spread` [-], shape (axes,): standard deviation of that share; 0 where it feels nothing
-    """
+def _with_cross_talk(data: IdentificationData, spread: FloatArray) -> IdentificationData:
+    """The same data whose displacement sensors may feel a share of the other axis' motion."""
     if len(data.axes) < 2 or not np.any(spread) or not all(axis.force.size for axis in data.axes):
         return data
     axes, felt = [], dict[Dof, int]()
@@ -86,20 +74,8 @@ def with_distances(data: IdentificationData, distance: FloatArray, spread: Float
     return replace(data, axes=axes, distance_place=place).with_unknowns(more, None)
 
 
-def without_distances(data: IdentificationData) -> IdentificationData:
-    """Return the same data whose flange sensors look at the flange itself, without the unknowns of `with_distances`, the last ones."""
-    count = len(data.distance_place)
-    if not count:
-        return data
-    left = len(data.coefficient_spread) - count
-    axes = [
-        replace(axis, behind=0.0, force_slope=axis.force_slope[:, :left], across_slope=axis.across_slope[:, :left]) for axis in data.axes
-    ]
-    return replace(data, axes=tuple(axes), coefficient_spread=data.coefficient_spread[:left], distance_place={})
-
-
-def with_rough_forces(data: IdentificationData) -> IdentificationData:
-    """Return the same data whose forces are known no better than tools: an error of depth, edge or run-out is a share of the whole force.
+def _with_rough_forces(data: IdentificationData) -> IdentificationData:
+    """The same data whose forces are known no better than tools: an error of depth, edge or run-out is a share of the whole force.
 
     Where little of that points along an axis, it is much of the little.
     """
@@ -111,5 +87,5 @@ def with_rough_forces(data: IdentificationData) -> IdentificationData:
 def with_rough_toolings(data: IdentificationData, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
     """Return the same data whose tool-holders are known only roughly. `rough`: of all toolings, in the data's order."""
     count, first = len(rough.unknowns), len(data.coefficient_spread)
-    held = replace(with_rough_forces(data), rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
+    held = replace(_with_rough_forces(data), rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
     return held.with_unknowns((1.0,) * count, None)

@@ -15,7 +15,7 @@ from rcsa_ident.base.scaleout import Map
 from rcsa_ident.base.units import from_hz
 from rcsa_ident.cutting.corner import corner_change, has_corner
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.receptance import Receptance, assumed_of
+from rcsa_ident.dynamics.receptance import assumed_of
 from rcsa_ident.identification.cut_data import prepare
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.hammer_data import AtPoints, with_tests
@@ -25,20 +25,13 @@ from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification, IdentificationCode
-from rcsa_ident.identification.rough_data import (
-    with_corners,
-    with_cross_talk,
-    with_distances,
-    with_rough_forces,
-    with_rough_toolings,
-    with_scales,
-)
+from rcsa_ident.identification.rough_data import with_distances, with_rough_cuts, with_rough_toolings
 from rcsa_ident.identification.workpiece_side import workpiece_side
 from rcsa_ident.setup.campaign import Campaign, HammerTest
 from rcsa_ident.setup.cut import Cut
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
-from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.sweep import measure_pass
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.drawings import KnownToolings, rough_toolings
@@ -157,11 +150,7 @@ def identify(
     `tests`: as `hammer_lines` returns them
     Raises `InputError` if no cut is usable, and there is no hammer test; or of a robot's cuts at several postures.
     """
-    _at_one_posture(campaign)
-    found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings)
-    clock = clock_remark(readings)
-    said = tuple(dict.fromkeys([*(remark for test in tests for remark in test.remarks), *([] if clock is None else [clock])]))
-    return replace(found, notes=(*found.notes, *said)) if said else found
+    return of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign, readings, tests)
 
 
 def _at_one_posture(campaign: Campaign) -> None:
@@ -200,13 +189,17 @@ def clock_remark(readings: Sequence[Reading]) -> Remark | None:
     return Remark(RecordCode.CLOCK, words)
 
 
-def of_campaign(found: Identification, campaign: Campaign, readings: Sequence[Reading] = ()) -> Identification:
+def of_campaign(
+    found: Identification, campaign: Campaign, readings: Sequence[Reading] = (), tests: Sequence[HammerLines] = ()
+) -> Identification:
     """Return the identification with what its machine has to know of the campaign, what is unusual about that, and shapes of cutters; and
     with what gives way on the workpiece's side, where the readings tell it.
     """
     side, told = workpiece_side(found, [each for reading in readings for each in reading.measurements], campaign.sensors)
     exact = () if found.toolings is not None or not campaign.rough else (Remark(IdentificationCode.DRAWINGS_EXACT, DRAWINGS_EXACT),)
-    notes = tuple(dict.fromkeys((*found.notes, *exact, *told, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
+    clock = clock_remark(readings)
+    said = (*(remark for test in tests for remark in test.remarks), *(() if clock is None else (clock,)))
+    notes = tuple(dict.fromkeys((*found.notes, *exact, *told, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids), *said)))
     drawings = {name: tooling.drawing for name, tooling in campaign.toolings.items()}
     values = () if found.toolings is None else learned(found.toolings, drawings)
     known = replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=values)
@@ -254,43 +247,50 @@ def _mode_deviation(
     return deviation(frequency), deviation(damping)
 
 
-def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = ()) -> IdentificationData:
-    """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them, which take these as drawn."""
-    if not tests:
-        return with_rough(_data_of_cuts(campaign, readings), campaign)
-    usable = any(bool(each.measurements) for each in readings)
-    return with_tests(_data_of_cuts(campaign, readings) if usable else None, tests, _at_points(campaign))
+def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = (), robot: bool = False) -> IdentificationData:
+    """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them, which take these as drawn.
+
+    `robot`: whether the cuts may have several postures; the flange's sensors look at the flange itself then
+    Raises `InputError` if no cut is usable, and there is no hammer test; or of cuts at several postures.
+    """
+    if not robot:
+        _at_one_posture(campaign)
+    cuts = _data_of_cuts(campaign, readings, tests, robot)
+    return with_tests(cuts, tests, _at_points(campaign)) if tests else with_rough(cuts, campaign)
 
 
 def data_to_learn_from(
     campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines], known: KnownToolings | None
 ) -> IdentificationData:
     """Return usable cuts and hits of the tip as what they tell of toolings that are known as well as drawings and earlier cuts say."""
-    usable = any(bool(each.measurements) for each in readings) or not tests
-    return with_rough(_data_of_cuts(campaign, readings) if usable else None, campaign, known, tests).learned_from()
+    return with_rough(_data_of_cuts(campaign, readings, tests), campaign, known, tests).learned_from()
 
 
 def _at_points(campaign: Campaign) -> dict[str, AtPoints]:
     return {name: partial(receptance_at_points, t.assembly) for name, t in campaign.toolings.items()}
 
 
-def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationData:
+def _data_of_cuts(
+    campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines], robot: bool = False
+) -> IdentificationData | None:
+    """The cuts alone; None where no cut is usable but there are tests."""
     measurements = [measurement for each in readings for measurement in each.measurements]
+    if not measurements and tests:
+        return None
     if not measurements:
         reasons = "; ".join(dict.fromkeys(reason for each in readings for reason in each.verdict.reasons))
         raise InputError("cuts", f"none of {len(readings)} usable ({reasons})", "at least one usable cut")
-    receptances = {name: partial(_receptance, campaign, name) for name in campaign.toolings}
+    receptances = {name: partial(tool_holder_receptance, t.assembly) for name, t in campaign.toolings.items()}
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
     known = campaign.coefficients
     edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
     unlike = [name for name, t in campaign.toolings.items() if t.cutter.repeats == 1]
-    turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
+    turning = {name: partial(turning_pair, t.assembly) for name, t in campaign.toolings.items()}
     data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning, unlike)
-    shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
-    sensors = [shown.get(axis.axis) for axis in data.axes]
+    sensors = _displacements(campaign, data)
     # where nobody tells it the flange itself is believed, and the lines are asked what they say to that
     told = [(0.0, 0.0) if s is None or s.distance is None else (s.distance, s.distance_spread) for s in sensors]
-    data = with_distances(data, *np.array(told).reshape(-1, 2).T)
+    data = data if robot else with_distances(data, *np.array(told).reshape(-1, 2).T)
     known_places = not data.of_flange or all(s is not None and s.distance is not None for s in sensors)
     made = _made(campaign, [each.cut_id for each in readings for _ in each.measurements])
     if np.all(made.judged):
@@ -353,23 +353,28 @@ def with_rough(
 def _with_rough_cuts(data: IdentificationData, campaign: Campaign) -> IdentificationData:
     """The data of cuts whose depths, corner radii and sensors are known as well as the campaign says."""
     depths = [np.mean([cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name]) for name in data.toolings]
-    shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
-    sensors = [shown.get(axis.axis) for axis in data.axes]
+    sensors = _displacements(campaign, data)
     # a place on the housing moves as it likes: its motion has no scale to be wrong
     gain, talk, delay = (
         np.array([0.0 if sensor is None else getattr(sensor, name) for sensor in sensors])
         for name in ("gain_spread", "cross_talk_spread", "delay_spread")
     )
-    data = with_scales(data, campaign.depth_spread / np.array(depths), gain, delay)
-    return with_rough_forces(with_cross_talk(with_corners(data, *_corners(data, campaign)), talk))
+    return with_rough_cuts(data, campaign.depth_spread / np.array(depths), gain, delay, talk, _corners(data, campaign))
 
 
-def _corners(data: IdentificationData, campaign: Campaign) -> tuple[list[str], list[ComplexArray]]:
-    """Whose corner radii are not known exactly, tooling by tooling, and what they do to the force in the lines of each axis."""
+def _displacements(campaign: Campaign, data: IdentificationData) -> list[Sensor | None]:
+    """The displacement sensor along each axis of the data."""
+    shown = {sensor.axis: sensor for sensor in campaign.sensors if sensor.quantity is Quantity.DISPLACEMENT}
+    return [shown.get(axis.axis) for axis in data.axes]
+
+
+def _corners(data: IdentificationData, campaign: Campaign) -> list[ComplexArray]:
+    """What corner radii that are not known exactly do to the force in each axis' lines, a column each: tools of one model share one."""
     drawn = [campaign.toolings[name] for name in data.toolings]
     owners = [_corner_owner(t) for t in drawn]
+    unknowns = [owner for owner in dict.fromkeys(owners) if owner]
     conditions = {cut.id: cut.conditions for cut in campaign.cuts}
-    changes = [np.zeros(axis.omega.size, dtype=complex) for axis in data.axes]
+    changes = [np.zeros((axis.omega.size, len(unknowns)), dtype=complex) for axis in data.axes]
     for axis, change in zip(data.axes, changes, strict=True):
         for k in np.unique(axis.cut):
             t = data.cut_tooling[k]
@@ -377,19 +382,11 @@ def _corners(data: IdentificationData, campaign: Campaign) -> tuple[list[str], l
                 own = np.flatnonzero(axis.cut == k)
                 cutter, wider = drawn[t].cutter, drawn[t].spread.corner_radius
                 ratio = corner_change(cutter, conditions[data.cut_ids[k]], campaign.coefficients, axis.order[own], wider)
-                change[own] = ratio[:, 0 if axis.axis is Dof.X else 1]
-    return owners, changes
+                change[own, unknowns.index(owners[t])] = ratio[:, 0 if axis.axis is Dof.X else 1]
+    return changes
 
 
 def _corner_owner(tooling: Tooling) -> str:
     """Whose corner radius it is, tool model or tooling; empty where it is known exactly."""
     rough = tooling.spread.corner_radius > 0.0 and has_corner(tooling.cutter)
     return (tooling.tool_model or tooling.name) if rough else ""
-
-
-def _turning(campaign: Campaign, name: str, omega: FloatArray, ratio: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    return turning_pair(campaign.toolings[name].assembly, omega, ratio)
-
-
-def _receptance(campaign: Campaign, name: str, omega: FloatArray) -> Receptance:
-    return tool_holder_receptance(campaign.toolings[name].assembly, omega)

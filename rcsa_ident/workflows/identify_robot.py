@@ -20,7 +20,6 @@ from rcsa_ident.identification.arm.result import RobotCode, RobotIdentification,
 from rcsa_ident.identification.arm.unknowns import arm_priors
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.model_order import Report
-from rcsa_ident.identification.rough_data import without_distances
 from rcsa_ident.machine.robot.flexible import FlexibleRobot
 from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.setup.cut import Cut
@@ -60,7 +59,7 @@ def robot_data(campaign: Campaign, readings: Sequence[Reading], robot: FlexibleR
     if campaign.rough:
         campaign = replace(campaign, toolings={name: replace(tooling, spread=EXACT) for name, tooling in campaign.toolings.items()})
     _check_sensors(campaign)
-    data = without_distances(data_of(campaign, readings).learned_from())
+    data = data_of(campaign, readings, robot=True).learned_from()
     beside = _Beside(campaign, data)
     postures, of_cut = check_postures([beside.cuts[id].posture for id in data.cut_ids], data.cut_ids, robot.model)
     teeth = {name: tooling.cutter.teeth for name, tooling in campaign.toolings.items()}

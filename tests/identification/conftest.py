@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.identification.rough_data import with_cross_talk, with_rough_toolings, with_scales
+from rcsa_ident.identification.rough_data import with_rough_cuts, with_rough_toolings
 from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings
 from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.spread import Spread
@@ -40,6 +40,6 @@ def rough(shop):
     data = shop.prepare(cuts[::3], spread=(0.05, 0.1, 0.9, 0.9))
     drawings = {name: Drawing(shop.toolings[name].assembly, Spread(), "tool", "holder") for name in data.toolings}
     holders = [rough_tool_holder(each.assembly, 4300.0) for each in drawings.values()]
-    data = with_scales(data, np.array([0.05, 0.07]), np.array([0.02, 0.02]), np.array([5e-6, 5e-6]))
-    data = with_cross_talk(data, np.array([0.015, 0.02]))
+    depth, gain, delay, talk = (np.array(each) for each in ((0.05, 0.07), (0.02, 0.02), (5e-6, 5e-6), (0.015, 0.02)))
+    data = with_rough_cuts(data, depth, gain, delay, talk)
     return with_rough_toolings(data, rough_toolings(drawings), holders).with_smooth_errors(2e-3, 2)

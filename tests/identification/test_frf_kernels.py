@@ -229,10 +229,11 @@ def test_the_slope_is_the_change_with_the_distance(seen):
     np.testing.assert_array_equal(far[:, 1], near[:, 1])
 
 
-def test_blocks_of_frequencies_are_independent():
-    """More lines than a block holds, and a last block that is not full: each line is as it is alone."""
+@pytest.mark.parametrize("further", [0, 1, 3])
+def test_blocks_of_frequencies_are_independent(further):
+    """As many lines as a block holds or more, and a last block that is not full, or has one line: each line is as it is alone."""
     rng = np.random.default_rng(16)
-    omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, kernels.BLOCK + 3)
+    omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, kernels.BLOCK + further)
     _, flange, tip = substructure(rng, omega)
     chosen = candidate(rng, 3, True)
     whole = cross(chosen, omega, flange, tip, "gap and fixture", gradient=True, x=0.3)

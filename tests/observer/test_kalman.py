@@ -190,6 +190,14 @@ def test_variance_is_that_of_the_error():
     assert told[1] < 0.9 * told[0]
 
 
+def test_a_band_looks_as_far_ahead_as_it_is_told(kalman):
+    """Who has more samples behind him than that has the band of the last one who has as many."""
+    settled, longest = kalman.gain.shape[0], 100
+    near, far = (deviations(kalman, settled + 300, True, **told) for told in ({"longest": longest}, {}))
+    np.testing.assert_allclose(near[-longest - 1 :], far[-longest - 1 :], rtol=1e-12)
+    np.testing.assert_array_equal(near[settled : -longest - 1], near[-longest - 1])
+
+
 def test_a_long_lag_is_the_smoother(kalman, measured):
     settled = kalman.gain.shape[0]
     result = run(kalman, measured)[1]

@@ -7,14 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.base.remarks import says
+from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.remarks import Remark, says
 from rcsa_ident.cutting.shape import CutterCode
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.passivity import FrfCode
+from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.modal_parameters import flange_of
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.unknowns import ModalBlock, pack
-from rcsa_ident.workflows.identify import mode_deviations, of_campaign
+from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.signals.verdict import RecordCode, Verdict
+from rcsa_ident.workflows.identify import data_of, mode_deviations, of_campaign
 from tests.fixtures import by_hand
+from tests.fixtures.virtual_shop import open_shop
 
 
 def identification_of(posterior):
@@ -104,3 +110,32 @@ def test_cutters_that_are_no_cylinders_are_noted(tmp_path, cutter, told):
     further = again.notes[len(found.notes) :]
     assert says(further, CutterCode.AS_CYLINDER) == bool(told)
     assert [note.startswith(told) and "forces of shallow cuts are 6 to 50 % off" in note for note in further] == [True] * bool(told)
+
+
+@pytest.mark.parametrize("fast", [0.0, 1e-3])
+def test_a_clock_and_what_tests_assume_are_noted_behind_all_else(tmp_path, fast):
+    """All speeds lie beside the programmed ones by as much: the spindle is slow or the recorder's clock fast."""
+    shop = open_shop(speeds=3)
+    cuts, _ = shop.measurements(np.random.default_rng(1))
+    readings = [Reading(each.cut_id, each.tooling, each.spindle_speed * (1.0 + fast), Verdict(()), (each,)) for each in cuts]
+    assumed = Remark(FrfCode.TURNED, "read as m/N")
+    omega = np.arange(1.0, 9.0)
+    hit = HammerLines("1", "T1", Dof.X, omega, np.ones(8), np.ones(8), 0.0, 0.0, remarks=(assumed,))
+    campaign, found = by_hand.campaign(tmp_path), by_hand.identification()
+    notes = of_campaign(found, campaign, readings, [hit, replace(hit, id="2")]).notes
+    plain = of_campaign(found, campaign).notes
+    assert notes[: len(plain) + 1] == (*plain, assumed)
+    assert len(notes) == len(plain) + 1 + (fast > 0.0)
+    if fast:
+        assert notes[-1].code is RecordCode.CLOCK
+        assert "clock_error_percent = 0.1 in [campaign]" in notes[-1]
+
+
+def test_cuts_at_several_postures_are_data_of_robots_alone(tmp_path):
+    campaign = by_hand.campaign(tmp_path)
+    first, *others = campaign.cuts
+    campaign = replace(campaign, cuts=(replace(first, posture=(0.1,) * 6), *others))
+    with pytest.raises(InputError, match=r"posture_deg: found cuts at 2 postures"):
+        data_of(campaign, [])
+    with pytest.raises(InputError, match=r"cuts: found none of 0 usable"):
+        data_of(campaign, [], robot=True)
