@@ -16,3 +16,13 @@ def test_the_cause_is_learned(tmp_path, name, code, error):
     assert row["reasons"][0].startswith(code or "joint-unknown")
     assert max(row[kind]["error"] for kind in KINDS) < error
     assert min(row[kind]["band"] for kind in KINDS) > 0.55
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "code"), [("warming, with a clock", "drifts-with-time"), ("warming, with a thermometer", "drifts-with-temperature")]
+)
+def test_a_campaign_that_tells_when_or_how_warm_is_learned_from(tmp_path, name, code):
+    row = identified(tmp_path, 7101, name, 0.5, told=True)
+    assert row["reasons"][0].startswith(code)
+    assert max(row[kind]["error"] for kind in KINDS) < 0.02
