@@ -109,7 +109,9 @@ def test_the_campaign_tells_when_its_cuts_began_and_how_warm_it_was(small):
     assert [(each - began[0]).total_seconds() for each in began] == [80.0 * k for k in range(4)]
     assert (began[0] - datetime(2026, 1, 5, 8)).total_seconds() == pytest.approx(30.0 - 0.5 * 0.06)
     assert all(21.0 < cut["temperature_c"] < 40.0 for cut in found["cuts"])
-    blind, steady = (tomllib.loads(campaign_text(dataclasses.replace(small, changes=each), toolings, 3)) for each in (Changes(SOFT), Changes()))
+    blind, steady = (
+        tomllib.loads(campaign_text(dataclasses.replace(small, changes=each), toolings, 3)) for each in (Changes(SOFT), Changes())
+    )
     assert [cut["started"] for cut in blind["cuts"]] == [cut["started"] for cut in found["cuts"]]
     assert not any("temperature_c" in cut for cut in blind["cuts"])
     assert not any("started" in cut for cut in steady["cuts"])
