@@ -37,7 +37,7 @@ from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
-from rcsa_ident.virtual.changes import REFERENCE_SPEED, Changes, ChipLaw, JointChanges, Turn, Warming, changed
+from rcsa_ident.virtual.changes import AMBIENT, REFERENCE_SPEED, Changes, ChipLaw, JointChanges, Turn, Warming, changed
 from rcsa_ident.workflows.identify import identify, judge, left_out
 from rcsa_ident.workflows.simulate import true_receptances
 
@@ -155,6 +155,9 @@ def errors_of(found: Identification, campaign: Campaign, machine: MachineFile, p
     """Return errors and band coverage of the tips, as ``cut``, ``same`` and ``other`` holder."""
     write_result(path, identification_to_json(found, campaign, []))
     answer, truth = machine_from_json(read_result(path), str(path)), warm_machine(machine)
+    # by a thermometer the warm machine is that of the warmest cut
+    follows = answer.warming is not None and answer.warming.thermometer is not None
+    standing = answer.at_temperature(AMBIENT + RISE if follows else None).at(REFERENCE_SPEED)
     omega = 2.0 * np.pi * FREQUENCY
     rows: dict[str, Any] = {}
     for kind, paths in zip(KINDS, (machine.toolings, *((each,) for each in machine.truth_toolings)), strict=True):
@@ -163,7 +166,7 @@ def errors_of(found: Identification, campaign: Campaign, machine: MachineFile, p
             tooling = read_tooling(tool)
             true = true_receptances(truth, tooling, REFERENCE_SPEED)
             at = np.searchsorted(true.frequency_hz, FREQUENCY - 1e-6)
-            tip = answer.at(REFERENCE_SPEED).tip(tooling, omega)
+            tip = standing.tip(tooling, omega)
             deviation = tip.deviation()
             for i, row in enumerate(TIP):
                 here = tip.between(str(row), str(row))
