@@ -195,7 +195,7 @@ def _run(settings: object) -> None:
     from api.data_folder import alone
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
-    from api.processes import share_heaps
+    from api.processes import leave_out_what_stays, share_heaps
     from api.settings import Settings
     from api.tls import Certificate
 
@@ -214,6 +214,7 @@ def _run(settings: object) -> None:
             _fail(error)
         except OSError as error:
             _fail(InputError("RCSA_IDENT_DATA", error.strerror or "an error", "a folder that can be made and written to"))
+        leave_out_what_stays()
         _listen(service, settings, certificate)
 
 
