@@ -7,6 +7,7 @@ import dataclasses
 import importlib
 import json
 import math
+from datetime import datetime
 from enum import Enum
 from functools import cache
 from typing import Any, Literal
@@ -25,6 +26,7 @@ NOUNS = {
     "IdentificationCode": "rcsa_ident.identification.result.IdentificationCode",
     "PlausibilityCode": "rcsa_ident.base.plausibility.PlausibilityCode",
     "FlangeCode": "rcsa_ident.machine.measured.FlangeCode",
+    "CourseCode": "rcsa_ident.setup.cut_course.CourseCode",
     "SensorCode": "rcsa_ident.signals.recording.SensorCode",
     "CutterCode": "rcsa_ident.cutting.shape.CutterCode",
     "RobotCode": "rcsa_ident.identification.arm.result.RobotCode",
@@ -105,6 +107,8 @@ def _plain(value: Any) -> Any:
     if type(value) is float:
         # JSON writes the shortest digits that lead back to the same number
         return value if math.isfinite(value) else {"~float": str(value)}
+    if type(value) is datetime:
+        return {"~moment": value.isoformat()}
     if type(value) is complex:
         return {"~complex": [_plain(value.real), _plain(value.imag)]}
     if isinstance(value, np.ndarray):
@@ -132,6 +136,8 @@ def _value(plain: Any) -> Any:
     ((kind, content),) = plain.items()
     if kind == "~float":
         return float(content)
+    if kind == "~moment":
+        return datetime.fromisoformat(content)
     if kind == "~complex":
         return complex(*(_value(each) for each in content))
     if kind == "~array":

@@ -3,8 +3,8 @@
 ``python -m benchmarks ideals``. Ten drawn machines (`benchmarks.machines`), 20 speeds with each of two toolings, no trigger, exact
 drawings, nothing told; of each one ideal is taken away at half the level at which it was first tried: the sensor looks behind the flange,
 the bearings warm up with speeds in order or at random, the force follows a curve of the chip while its straight line is told, or the
-joint gives way with amplitude and is clamped anew. Errors of the tip are those of `benchmarks.comparison`, against the warm machine at 14
-000 rev/min.
+joint gives way with amplitude and is clamped anew. Bearings that warm up are tried without a clock, with it, and with a thermometer.
+Errors of the tip are those of `benchmarks.comparison`, against the warm machine at 14 000 rev/min.
 
 Seeds: 7301 to 7310 for the figures, 7101 to 7103 for development; fixed on 2026-11-27, before anything of them was simulated. (7001 to 7008
 with no ideal taken away, and 7201 to 7210 had been looked at while `identification.causes` was written.)
@@ -38,12 +38,14 @@ from rcsa_ident.setup.campaign import Campaign
 from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.tip_modes import TIP
-from rcsa_ident.virtual.changes import REFERENCE_SPEED, Changes, ChipLaw, JointChanges, Turn, Warming, changed
+from rcsa_ident.virtual.changes import AMBIENT, REFERENCE_SPEED, Changes, ChipLaw, JointChanges, Turn, Warming, changed
 from rcsa_ident.workflows.identify import identify, judge, left_out
 from rcsa_ident.workflows.simulate import true_receptances
 
 EVALUATION, DEVELOPMENT = tuple(range(7301, 7311)), (7101, 7102, 7103)
 SPEEDS = 20
+#: Of a thermometer near the front bearings, from the cold machine to the warm one [K].
+RISE = 18.0
 #: An error above which an answer must not be called converged.
 LARGEST = 0.05
 KINDS, KEYS = ("cut", "same", "other"), ("machine", "ideal", "level", "told")
@@ -56,12 +58,14 @@ class Ideal:
     `cause`: empty: none
     `seen_at` [m]
     `soft` [-]: factor on the flange joint's stiffness
+    `clock`: whether the campaign tells when the cuts of a machine that warms up were made
     """
 
     cause: str = ""
     seen_at: float = 0.0
     changes: Changes = STEADY
     soft: float = 1.0
+    clock: bool = False
 
     @property
     def bends(self) -> bool:
@@ -78,6 +82,8 @@ def ideals(level: float) -> dict[str, Ideal]:
         "sensor": Ideal("distance", seen_at=30e-3 * level),
         "warming in order": Ideal("time", changes=Changes(in_order)),
         "warming at random": Ideal("time", changes=Changes(replace(in_order, shuffled=True))),
+        "warming, with a clock": Ideal("time", changes=Changes(in_order), clock=True),
+        "warming, with a thermometer": Ideal("temperature", changes=Changes(replace(in_order, rise=RISE)), clock=True),
         "chip law": Ideal("order", changes=Changes(chip_law=bent)),
         "joint": Ideal("clamping", changes=Changes(joint=joint), soft=0.25),
         "all": Ideal(seen_at=30e-3 * level, changes=Changes(warmed_up, joint, bent), soft=0.25),
@@ -123,16 +129,22 @@ def campaign_of(scratch: Path, seed: int, name: str, level: float, told: bool) -
     """Return the machine, its campaign with what is told of it, and the verdicts; simulated where that is not done yet."""
     ideal = ideals(level)[name]
     machine = machine_without(seed, ideal, scratch / str(seed))
-    folder = scratch / str(seed) / f"{name.replace(' ', '-')}-{level:g}"
+    folder = scratch / str(seed) / f"{_file_name(name)}-{level:g}"
     if not (folder / "campaign.toml").is_file():
         simulate_campaign(machine, folder, seed)
     campaign = read_campaign(folder)
     if not told:
         campaign = replace(campaign, sensors=tuple(replace(each, distance=None) for each in campaign.sensors))
+    if not ideal.clock:
+        campaign = replace(campaign, cuts=tuple(replace(each, started=None) for each in campaign.cuts))
     law = ideal.changes.chip_law
     if law is not None:
         campaign = replace(campaign, workpiece=straight(campaign.workpiece, law, machine.plan.feed_per_tooth))
     return machine, campaign, judge(campaign, lambda cut: read_cut(campaign, cut))
+
+
+def _file_name(ideal: str) -> str:
+    return ideal.replace(",", "").replace(" ", "-")
 
 
 def warm_machine(machine: MachineFile) -> MachineFile:
@@ -146,6 +158,9 @@ def errors_of(found: Identification, campaign: Campaign, machine: MachineFile, p
     """Return errors and band coverage of the tips, as ``cut``, ``same`` and ``other`` holder."""
     write_result(path, identification_to_json(found, campaign, []))
     answer, truth = machine_from_json(read_result(path), str(path)), warm_machine(machine)
+    # by a thermometer the warm machine is that of the warmest cut
+    follows = answer.warming is not None and answer.warming.thermometer is not None
+    standing = answer.at_temperature(AMBIENT + RISE if follows else None).at(REFERENCE_SPEED)
     omega = 2.0 * np.pi * FREQUENCY
     rows: dict[str, Any] = {}
     for kind, paths in zip(KINDS, (machine.toolings, *((each,) for each in machine.truth_toolings)), strict=True):
@@ -154,7 +169,7 @@ def errors_of(found: Identification, campaign: Campaign, machine: MachineFile, p
             tooling = read_tooling(tool)
             true = true_receptances(truth, tooling, REFERENCE_SPEED)
             at = np.searchsorted(true.frequency_hz, FREQUENCY - 1e-6)
-            tip = answer.at(REFERENCE_SPEED).tip(tooling, omega)
+            tip = standing.tip(tooling, omega)
             deviation = tip.deviation()
             for i, row in enumerate(TIP):
                 here = tip.between(str(row), str(row))
@@ -185,7 +200,7 @@ def identified(scratch: Path, seed: int, name: str, level: float, told: bool = F
         "unexplained": [float(f"{axis.model_error:.4g}") for axis in found.axes.values()],
         "left_out": len(left_out(readings)),
         "seconds": round(seconds, 1),
-        **errors_of(found, campaign, machine, scratch / str(seed) / f"{name.replace(' ', '-')}-{level:g}.json"),
+        **errors_of(found, campaign, machine, scratch / str(seed) / f"{_file_name(name)}-{level:g}.json"),
     }
 
 
@@ -194,6 +209,7 @@ def named(row: dict[str, Any], cause: str) -> bool:
     first = {
         "distance": ("sensor-distance", "distance-untold"),
         "time": ("drifts-with-time",),
+        "temperature": ("drifts-with-temperature",),
         "order": ("force-orders",),
         "clamping": ("clamped-anew", "joint-gives-way"),
     }

@@ -21,7 +21,7 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.io.channels import RATE, Channel, Signals, notes_of
+from rcsa_ident.io.channels import RATE, STARTED, Channel, Signals, notes_of, started_of
 from rcsa_ident.io.recordings.hdf5 import LARGEST_CHUNK
 from rcsa_ident.io.recordings.readers import in_si, read_signals, recorded
 from rcsa_ident.setup.cut import Cut
@@ -43,6 +43,8 @@ def write_normalised(path: Path, rate: float, signals: Sequence[Channel], sensor
     with h5py.File(path, "w") as file:
         _reserve(path, sum(_stored(signal.size, chunk, kind) for signal, chunk, kind in zip(signals, chunks, kinds, strict=True)))
         file.attrs[RATE] = float(rate)
+        if (started := started_of(signals)) is not None:
+            file.attrs[STARTED] = started.isoformat()
         file.attrs[_SENSORS] = json.dumps([asdict(sensor) for sensor in sensors])
         file.attrs[_NOTES] = json.dumps([(note.code, str(note)) for note in notes_of(signals)])
         for i, (signal, chunk, kind) in enumerate(zip(signals, chunks, kinds, strict=True)):
@@ -93,7 +95,7 @@ def read_normalised(path: str | Path, in_file: bool = False) -> Recording:
     """
     sensors, notes = _about(Path(path))
     rate, signals = read_signals(path, [f"{i}" for i in range(len(sensors))], suffix=".h5")
-    return (recorded if in_file else in_si)(rate, Signals(signals, notes), sensors)
+    return (recorded if in_file else in_si)(rate, Signals(signals, notes, started=signals.started), sensors)
 
 
 def read_cut_normalised(cut: Cut) -> tuple[Recording, Recording | None]:

@@ -211,6 +211,9 @@ class Modes(Answer):
     workpiece_side: dict[str, SideModes] = Field(
         {}, description="What gives way under the workpiece, by axis: limits hold for tool and workpiece together, a tip FRF is the tool's."
     )
+    learned: list[str] = Field(
+        [], description="What was learned beyond the modes: warming, forces and joints that differ from what was told."
+    )
     toolings: list[LearnedNumber] = Field([], description="What the cuts taught of toolings whose drawings are not exact.")
 
 

@@ -16,7 +16,7 @@ from api.schemas.tips import TappedTip
 from api.schemas.toolings import EXAMPLE, ToolingKeys
 from api.work.requests import AdviceRequest, LobeRequest, TipRequest
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, POWER, SPINDLE_SPEED, TORQUE
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, POWER, SPINDLE_SPEED, TEMPERATURE, TORQUE
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.cutting.conditions import Block, Engagement
 from rcsa_ident.cutting.stock import AskedEngagement, Immersion
@@ -35,6 +35,11 @@ Tooling = Annotated[Name | ToolingKeys, Field(description="Name in the library, 
 OnMachine = Annotated[Id | None, Field(description="Id of a machine; in its place `robot` takes an arm at a posture.")]
 OnRobot = Annotated[Posed | None, Field(description="In place of a machine.")]
 OnTip = Annotated[TappedTip | None, Field(description="In place of a machine: tap tests of the only tooling, or of a cutter.")]
+Celsius = Annotated[
+    Annotated[float, within(TEMPERATURE)] | None,
+    Field(description="Near the bearings, for a machine that changes with a temperature; null: the warm machine."),
+]
+STATE = "For which state of the machine it holds; null where it has one alone."
 Spread = Annotated[Percent, Field(description="How well the tool-holder's stiffness is known [%]: part of the bands.")]
 
 
@@ -51,18 +56,23 @@ class TipQuery(Body):
     to_hz: Hertz | None = Field(None, description="By default the end of the identified band.")
     step_hz: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     spindle_speed_rpm: Rpm | None = Field(None, description="For a machine that changes with it.")
+    temperature_c: Celsius = None
     bands: bool = True
     stiffness_spread_percent: Spread = 0.05
 
     def request(self, work_seconds: float) -> TipRequest:
         """Return the query in SI."""
-        untold = [] if self.tip is None else sorted(self.model_fields_set & {"from_hz", "to_hz", "step_hz", "spindle_speed_rpm"})
+        untold = (
+            []
+            if self.tip is None
+            else sorted(self.model_fields_set & {"from_hz", "to_hz", "step_hz", "spindle_speed_rpm", "temperature_c"})
+        )
         if untold:
             allowed = "nothing beside a tip: it answers where it was measured, and tip.from_hz leaves lines out"
             raise InputError(untold[0], getattr(self, untold[0]), allowed)
         speed = None if self.spindle_speed_rpm is None else from_rpm(self.spindle_speed_rpm)
         spread = self.stiffness_spread_percent / 100.0
-        return TipRequest(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, spread, work_seconds)
+        return TipRequest(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, spread, work_seconds, self.temperature_c)
 
 
 class TipAnswer(Answer):
@@ -74,6 +84,7 @@ class TipAnswer(Answer):
     axes: dict[str, Curve]
     cross: dict[str, Curve] = Field(default={}, description="Where planes feel each other: XY is the motion in X under a force in Y.")
     spindle_speed_rpm: float | None = Field(None, description="At which they hold; null where they do not change with it.")
+    state: str | None = Field(None, description=STATE)
 
 
 class Cut(Keys, fields=ASKED_CUT, limits=True, defaults=True):
@@ -160,6 +171,7 @@ class Milled(Body):
     )
     bands: bool = True
     stiffness_spread_percent: Spread = 0.05
+    temperature_c: Celsius = None
 
     def request(self, work_seconds: float) -> LobeRequest:
         """Return the query in SI, for one of its toolings."""
@@ -171,6 +183,7 @@ class Milled(Body):
             self.bands,
             self.stiffness_spread_percent / 100.0,
             work_seconds / max(len(self.toolings), 1),
+            temperature=self.temperature_c,
         )
 
 
@@ -290,6 +303,7 @@ class ToolingLobes(Answer):
 
     tooling: str
     method: str
+    state: str | None = Field(None, description=STATE)
     spindle_speed_rpm: list[float]
     limit_depth_mm: list[float | None]
     limit_depth_low_mm: list[float | None] | None = Field(
@@ -401,6 +415,7 @@ class ToolingAdvice(Answer):
 
     tooling: str
     stickout_mm: float | None = Field(description="null of a cutter alone.")
+    state: str | None = Field(None, description=STATE)
     lowest_limit_mm: float | None
     common_stable_depth_mm: float | None = Field(description="Stable at every speed with all possible machines and cutting coefficients.")
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")

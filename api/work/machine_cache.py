@@ -95,7 +95,10 @@ def read(text: str) -> Machine:
     identified = machine_from_json(parsed(text), "")
     ends = np.array([from_hz(LOWEST), 0.5 * identified.band[1] + 1.0, identified.band[1]])
     speeds = [None, *(0.5 * sum(model.speeds) for model in identified.speed_models)]
-    if not all(_finite(identified.at(speed), ends) for speed in speeds):
+    machines = [identified.at(speed) for speed in speeds]
+    if identified.warming is not None and identified.warming.coldest is not None and not identified.speed_models:
+        machines.append(identified.at_temperature(identified.warming.coldest))
+    if not all(_finite(each, ends) for each in machines):
         raise InputError("axes", "unknowns or modes without a finite receptance", "a machine that the reader of results can compute")
     return identified
 

@@ -70,6 +70,7 @@ class TipRequest:
     `speed` [rad/s]
     `stiffness_spread`: as a share
     `work_seconds` [s]: longer work is refused
+    `temperature` [°C]: near the bearings
     """
 
     low: float | None
@@ -79,6 +80,7 @@ class TipRequest:
     bands: bool
     stiffness_spread: float
     work_seconds: float
+    temperature: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +93,7 @@ class LobeRequest:
     `work_seconds` [s]: longer work is refused
     `tested`: tuple of (speed [rad/s], depth [m], "stable", "chatter" or "marginal"); cuts that were tried
     `recommend`: whether cuts are recommended, too: zero-order limits alone are there at once
+    `temperature` [°C]: near the bearings
     """
 
     cut: CutSpec
@@ -102,6 +105,7 @@ class LobeRequest:
     work_seconds: float
     recommend: bool = True
     tested: tuple[tuple[float, float, str], ...] = ()
+    temperature: float | None = None
 
     @property
     def preview(self) -> bool:
@@ -113,7 +117,8 @@ class LobeRequest:
         draws = DRAWS if self.bands else 0
         method = method_named(self.method)
         speeds, spread = np.array(self.speeds), self.stiffness_spread
-        return ToolChange(machine, tooling, self.cut, speeds, self.max_depth, method, draws, spread, self.recommend)
+        here = machine.at_temperature(self.temperature)
+        return ToolChange(here, tooling, self.cut, speeds, self.max_depth, method, draws, spread, self.recommend)
 
     @property
     def tested_cuts(self) -> TestedCuts | None:

@@ -6,7 +6,7 @@ import json
 import math
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -95,7 +95,13 @@ def modes(text: str) -> dict[str, Any]:
         name: {key: axis[key] for key in ("sensor", "role", "lines", "modes")} | {"misfit_per_point": axis["misfit"]["chi2_per_point"]}
         for name, axis in data.get("workpiece_side", {}).items()
     }
-    told = {"axes": axes, "both_planes": both, "workpiece_side": side, "toolings": data.get("toolings", {}).get("learned", [])}
+    told = {
+        "learned": data.get("learned", {}).get("in_words", []),
+        "axes": axes,
+        "both_planes": both,
+        "workpiece_side": side,
+        "toolings": data.get("toolings", {}).get("learned", []),
+    }
     return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | told
 
 
@@ -115,7 +121,7 @@ def tooltip(machine: MachineText, tooling: ToolingSource, request: TipRequest, c
     else:
         found = _predicted(machine, tooling, request)
     if not csv:
-        told = {"tooling": found.tooling.name, "warnings": list(found.remarks)} | _speed(found.speed)
+        told = {"tooling": found.tooling.name, "warnings": list(found.remarks), "state": found.state or None} | _speed(found.speed)
         return told | frf_summary(found.tip, found.tip.rows)
     with tempfile.TemporaryDirectory(prefix="rcsa-ident-") as folder:
         path = Path(folder) / "FRF.csv"
@@ -125,7 +131,7 @@ def tooltip(machine: MachineText, tooling: ToolingSource, request: TipRequest, c
 
 def _predicted(machine: MachineText, tooling: ToolingSource, request: TipRequest) -> TipAnswer:
     """The tip of a tooling on a machine, after a look at what it will cost."""
-    known = _machines.get(machine, request.bands)
+    known = cast(Machine, _machines.get(machine, request.bands).at_temperature(request.temperature))
     omega = _lines(known, request.low, request.high, request.step)
     tool = tooling_from(tooling)
     weigh(tool.assembly, to_hz(float(omega[-1])))

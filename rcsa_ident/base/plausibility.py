@@ -36,8 +36,8 @@ class Range:
     `unit`: of the limits, as a file has it
     `size`: of the unit in SI
     `usual`, `possible`: (float, float) [unit]; outside the first is a remark, outside the second an error; both ends belong to them
-    `slips`: tuple of (str, float); questions with a place for the value that may have been meant, and what leads to it from the one that
-        was given
+    `slips`: tuple of (str, float) or (str, float, float); questions with a place for the value that may have been meant, and what leads to
+        it from the one that was given: a factor, and what is then added
 
     Examples
     --------
@@ -51,7 +51,7 @@ class Range:
     size: float
     usual: tuple[float, float]
     possible: tuple[float, float]
-    slips: tuple[tuple[str, float], ...] = ()
+    slips: tuple[tuple[str, float] | tuple[str, float, float], ...] = ()
 
     def checked(self, field: str, value: float) -> float:
         """Return a value [SI] that is possible. Raises `InputError` with what is usual, and the slip that would explain the value."""
@@ -87,8 +87,8 @@ class Range:
         return f"{self.usual[0]:g} to {self.usual[1]:g} {self.unit}".rstrip()
 
     def _slip(self, value: float) -> str:
-        for question, factor in self.slips:
-            meant = self._given(value) * factor
+        for question, factor, *more in self.slips:
+            meant = self._given(value) * factor + sum(more)
             if self.usual[0] <= meant <= self.usual[1]:
                 return ": " + question.format(f"{meant:.6g} {self.unit}".rstrip())
         return ""
@@ -195,6 +195,14 @@ SPINDLE_SPEED = Range(
     (150.0, 80_000.0),
     (10.0, 500_000.0),
     (("were rev/min given as rad/s ({})?", from_rpm(1.0)), ("was rad/s given in rev/s ({})?", 2.0 * math.pi)),
+)
+#: Near a spindle's bearings.
+TEMPERATURE = Range(
+    "°C",
+    1.0,
+    (0.0, 100.0),
+    (-40.0, 200.0),
+    (("was it given in kelvin ({})?", 1.0, -273.15), ("was it given in degrees Fahrenheit ({})?", 5.0 / 9.0, -160.0 / 9.0)),
 )
 #: Of the widest point of an edge.
 CUTTING_SPEED = Range("m/min", 1.0 / 60.0, (0.5, 2500.0), (0.0, 1e6), (("were rev/min given as rad/s ({})?", from_rpm(1.0)),))

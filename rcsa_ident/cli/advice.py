@@ -14,7 +14,8 @@ from rcsa_ident.base.units import from_rpm, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import change_of, cut_of, drive_of, numbers, share_of, speeds_of, subjects_of
 from rcsa_ident.cli.lobes import Plot, check_plot
-from rcsa_ident.cli.options import Bands, CutOptions, DriveOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
+from rcsa_ident.cli.options import Bands, CutOptions, DriveOptions, SpeedOptions, StiffnessSpread, TemperatureC, TipOptions, takes_groups
+from rcsa_ident.cli.results import at_temperature
 from rcsa_ident.stability.methods import MethodName
 
 if TYPE_CHECKING:
@@ -101,6 +102,7 @@ def advise(
             show_default=False,
         ),
     ] = None,
+    temperature_c: TemperatureC = None,
     bands: Bands = True,
     stiffness_spread: StiffnessSpread = 0.05,
     json_: Json = False,
@@ -126,6 +128,7 @@ def advise(
         share_of(reserve, "--reserve", 90.0),
     )
     machine, toolings = subjects_of(files, tip, stickout_mm, _MOST)
+    machine = at_temperature(machine, temperature_c)
     cuts = [_planned(text, speeds.max_depth_mm) for text in planned or []]
     asked, has, depth = cut_of(cut, speeds.speed_variation), drive_of(drive), None if depth_mm is None else depth_mm * 1e-3
     answered: list[Advice] = []

@@ -57,12 +57,13 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
     from rcsa_ident.identification.status import too_few
     from rcsa_ident.report.summaries import recording_rows
     from rcsa_ident.workflows.coverage import left_open
+    from rcsa_ident.workflows.cut_times import time_remarks
 
     stages = Stages(quiet=json_)
     with workers_or_cluster(processes, dask) as pool:
         campaign, readings = read_and_judge(campaign_dir, pool, stages)
     tests = read_tests(campaign)
-    rows, open_, remarks = recording_rows(readings), left_open(campaign, readings), campaign.remarks
+    rows, open_, remarks = recording_rows(readings), left_open(campaign, readings), (*campaign.remarks, *time_remarks(campaign, readings))
     usable = sum(row.usable for row in rows)
     # each window of a pass is a cut of its own
     of_flange = not any(measurement.housing for each in readings for measurement in each.measurements)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -13,8 +13,8 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_hz, from_rpm, inclusive, to_hz, to_rpm
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import change_of, cut_of, share_of, subjects_of
-from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
-from rcsa_ident.cli.results import read_machine
+from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TemperatureC, TipOptions, takes_groups
+from rcsa_ident.cli.results import at_temperature, read_machine
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -56,6 +56,7 @@ def tooltip(
             show_default=False,
         ),
     ] = None,
+    temperature_c: TemperatureC = None,
     relative: Annotated[
         bool, typer.Option("--relative", help="Relative to the workpiece, where that gives way, too: what lobes are computed from.")
     ] = False,
@@ -71,7 +72,7 @@ def tooltip(
     check_plot(plot)
     spindle_speed = None if speed is None else from_rpm(positive("--speed", speed, "rev/min"))
     share = share_of(stiffness_spread, "--stiffness-spread", 50.0)
-    machine = read_machine(result)
+    machine = cast("Machine", at_temperature(read_machine(result), temperature_c))
     last = to_hz(machine.band[1]) if to is None else to  # type: ignore[index]
     first = to_hz(machine.lowest) if from_ is None else from_
     frequency = inclusive(first, last, step, ("--from", "--to", "--step"), "Hz")
@@ -109,14 +110,15 @@ def tell_tooltip(
     peaks = peaks_of(frequency, found.tip, deviation)
     if json_:
         summary = {"frequencies": len(frequency), "peaks": {name: asdict(p) for name, (p, _) in peaks.items()}}
-        summary |= {"spindle_speed_rpm": None if found.speed is None else to_rpm(found.speed)}
+        summary |= {"spindle_speed_rpm": None if found.speed is None else to_rpm(found.speed), "state": found.state or None}
         emit(summary | {"warnings": list(found.remarks), "seconds": stages.seconds, "out": str(out)})
         return
     from rcsa_ident.cli.tables import show_peaks
 
     show_peaks({name: (p.frequency_hz, p.magnitude, p.lowest_real_part, band) for name, (p, band) in peaks.items()})
-    if found.speed is not None:
-        say(f"at {to_rpm(found.speed):.0f} rev/min{'' if spindle_speed is not None else ', the middle of the speeds that were cut'}")
+    if found.state:
+        middle = "" if spindle_speed is not None or found.speed is None else ", the middle of the speeds that were cut"
+        say(f"{found.state}{middle}")
     if "XY" in peaks:
         say("XY: motion in X under a force in Y; YX the other way")
     for remark in found.remarks:
@@ -159,6 +161,7 @@ def lobes(
     ] = None,
     map_depths: Annotated[int, typer.Option(min=2, max=2000, help="Steps of the depth in the map.")] = 100,
     map_full: Annotated[bool, typer.Option(help="Compute every point of the map instead of following the boundary.")] = False,
+    temperature_c: TemperatureC = None,
     plot: Plot = None,
     bands: Bands = True,
     stiffness_spread: StiffnessSpread = 0.05,
@@ -174,6 +177,7 @@ def lobes(
     if map_ is not None:
         writable(map_, "--map")
     machine, (tooling,) = subjects_of(files, tip)
+    machine = at_temperature(machine, temperature_c)
     change = change_of(machine, tooling, cut_of(cut, speeds.speed_variation), speeds, bands, stiffness_spread)
     if surface_depth_mm is not None and change.cut.feed_per_tooth is None:
         raise InputError("--surface-depth-mm", surface_depth_mm, "given together with --feed-per-tooth-mm")
@@ -233,6 +237,8 @@ def tell_lobes(
     from rcsa_ident.cli.tables import show_lobes, show_tally
 
     show_lobes(advice)
+    if advice.state:
+        say(advice.state)
     if advice.tested is not None:
         show_tally(advice.tested)
     for remark in remarks:

@@ -173,6 +173,17 @@ class SpeedOptions:
     method: Annotated[MethodName, typer.Option(help="Stability method.", rich_help_panel=_SPEEDS)] = MethodName.ZERO_ORDER
 
 
+#: Of a machine that follows a thermometer.
+TemperatureC = Annotated[
+    float | None,
+    typer.Option(
+        "--temperature-c",
+        help="Temperature near the bearings, °C, for a machine that changes with it; default: the warm machine.",
+        show_default=False,
+    ),
+]
+
+
 @dataclass(frozen=True, slots=True)
 class DriveOptions:
     """What the spindle has."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ import typer
 
 from rcsa_ident.base.errors import InputError, positive
 from rcsa_ident.base.units import from_rpm, to_rpm
-from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import engagement, feed_angle
 from rcsa_ident.cli.options import Strategy, option
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from rcsa_ident.identification.experiment_design import Goal
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.workflows.plan import PlannedCut, PlannedCuts
+    from rcsa_ident.workflows.plan_course import Course
     from rcsa_ident.workflows.plan_passes import PlannedPasses
 
 #: Recordings of a campaign that its noise is learned from.
@@ -98,13 +100,19 @@ def plan(
     campaign: Annotated[
         Path | None, typer.Option(help="Campaign whose recordings give the noise, instead of --noise-nm.", show_default=False)
     ] = None,
+    seed: Seed = 1,
     json_: Json = False,
 ) -> None:
-    """Choose the stable cuts that tell most about the tooltips that are wanted, and say what they will be good for."""
+    """Choose the stable cuts that tell most about the tooltips that are wanted, and say what they will be good for.
+
+    PLAN.toml has them in the order in which to make them: half an hour of warm-up before each tooling, then speeds in random order.
+    Among them are six further cuts at half the feed; the first cut of each tooling is made once more at the end.
+    """
     from rcsa_ident.cli.results import read_identified, tell
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.settings.setups import read_tooling
     from rcsa_ident.workflows.plan import CutConstraints, alternating, plan_cuts
+    from rcsa_ident.workflows.plan_course import in_course
     from rcsa_ident.workflows.plan_passes import plan_passes
 
     writable(out)
@@ -134,17 +142,21 @@ def plan(
             if feed_direction is None:
                 allowed = alternating(allowed, cut_with, known)
             planned = plan_cuts(machine, cut_with, wanted_tips, allowed, known, noise, errors, within, cuts, wanted, _goal(goal))
+            course = in_course(planned.cuts, machine, cut_with, allowed, known, seed)
     if passes is not None:
         _tell_passes(planned_passes, out, noise, json_, stages.seconds)
         return
-    write_text(out, plan_text(planned))
+    write_text(out, plan_text(planned, course))
     if json_:
-        emit(_summary(planned, wanted) | {"noise_nm": noise * 1e9, "seconds": stages.seconds, "out": str(out)})
+        emit(_summary(planned, course, wanted) | {"noise_nm": noise * 1e9, "seconds": stages.seconds, "out": str(out)})
         return
     _show(planned)
+    for each in course:
+        counts = ", ".join(f"{count} for {what}" for what, count in Counter(str(cut.purpose) for cut in each.cuts).items())
+        say(f"{each.tooling}: half an hour of warm-up at {to_rpm(each.warm_up_speed):.0f} rev/min, then {counts}, in random order")
     for doubt in planned.warnings:
         warn(doubt)
-    say(f"written: {out} ({len(planned.cuts)} cuts, {stages.seconds['plan']:.2f} s)")
+    say(f"written: {out} ({sum(len(each.cuts) for each in course)} cuts, {stages.seconds['plan']:.2f} s)")
 
 
 def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, seconds: dict[str, float]) -> None:
@@ -185,13 +197,22 @@ def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, s
     say(f"written: {out} ({len(planned.passes)} passes, {sum(each.seconds for each in planned.passes):g} s of cutting)")
 
 
-def plan_text(planned: PlannedCuts) -> str:
-    """Return the cuts as a campaign file has them; the recordings are named, not yet made."""
+def plan_text(planned: PlannedCuts, course: Sequence[Course]) -> str:
+    """Return the cuts as a campaign file has them, in the order in which they are made; the recordings are named, not yet made."""
     from rcsa_ident.io.settings.cuts import cut_keys
     from rcsa_ident.io.toml_text import toml_of
+    from rcsa_ident.workflows.plan_course import WARM_UP
 
-    cuts = [cut_keys(name, cut.tooling, cut.conditions) for name, cut in zip(_names(planned), planned.cuts, strict=True)]
-    text = toml_of({"cuts": cuts}, digits=9)
+    parts = []
+    for each in course:
+        cuts = [cut_keys(turn.id, turn.cut.tooling, turn.cut.conditions) for turn in each.cuts]
+        turning = f"{to_rpm(each.warm_up_speed):.0f} rev/min for {WARM_UP / 60.0:g} minutes"
+        remarks = (
+            f"{each.tooling}: let the spindle turn at {turning}, then cut in this order.",
+            "Write `started` into each cut, and `temperature_c` of a thermometer near the bearings.",
+        )
+        parts.append(toml_of({"cuts": cuts}, remarks, digits=9))
+    text = "\n".join(parts)
     if planned.judges:
         judges = [cut_keys(_judge(cut), cut.tooling, cut.conditions) | {"validation": True} for cut in planned.judges]
         # a campaign does not know these toolings yet
@@ -203,11 +224,6 @@ def plan_text(planned: PlannedCuts) -> str:
 def _judge(cut: PlannedCut) -> str:
     """The id of a cut that judges the answer."""
     return f"{cut.tooling}-validation"
-
-
-def _names(planned: PlannedCuts) -> list[str]:
-    """An id for each cut: tooling and place in the plan."""
-    return [f"{cut.tooling}-plan-{i:02d}" for i, cut in enumerate(planned.cuts, start=1)]
 
 
 def _depths(text: str) -> tuple[float, ...]:
@@ -290,14 +306,17 @@ def _row(name: str, cut: PlannedCut) -> dict[str, Any]:
         "tooling": cut.tooling,
         "spindle_speed_rpm": float(f"{to_rpm(c.spindle_speed):.9g}"),
         "axial_depth_mm": float(f"{c.axial_depth * 1e3:.9g}"),
+        "feed_per_tooth_mm": float(f"{c.feed_per_tooth * 1e3:.9g}"),
         "feed_direction": _direction(c.feed_angle),
         "limit_depth_mm": cut.limit_depth * 1e3,
     }
 
 
-def _summary(planned: PlannedCuts, wanted: float | None) -> dict[str, Any]:
+def _summary(planned: PlannedCuts, course: Sequence[Course], wanted: float | None) -> dict[str, Any]:
     """What a machine wants to know of a plan."""
-    rows = [_row(name, cut) for name, cut in zip(_names(planned), planned.cuts, strict=True)]
+    from rcsa_ident.workflows.plan_course import WARM_UP, names_of
+
+    rows = [_row(name, cut) for name, cut in zip(names_of(planned.cuts), planned.cuts, strict=True)]
     bands = [dict(zip(planned.targets, (100.0 * row).tolist(), strict=True)) for row in planned.band]
     summary: dict[str, Any] = {
         "cuts": [row | {"band_percent": after} for row, after in zip(rows, bands[1:], strict=True)],
@@ -307,6 +326,15 @@ def _summary(planned: PlannedCuts, wanted: float | None) -> dict[str, Any]:
         "unstable": planned.unstable,
         "warnings": list(planned.warnings),
         "validation": [_row(_judge(cut), cut) for cut in planned.judges],
+        "course": [
+            {
+                "tooling": each.tooling,
+                "warm_up_minutes": WARM_UP / 60.0,
+                "warm_up_speed_rpm": to_rpm(each.warm_up_speed),
+                "cuts": [_row(turn.id, turn.cut) | {"purpose": str(turn.purpose)} for turn in each.cuts],
+            }
+            for each in course
+        ],
     }
     if wanted is not None:
         enough = planned.fewest(wanted)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcsa_ident.base.errors import InputError
 from rcsa_ident.cli.common import warn
 
 if TYPE_CHECKING:
@@ -29,6 +30,14 @@ def read_tip_source(path: Path) -> TipSource:
         if is_learnt_tip(data):
             return learnt_tip_of(data, str(path))
     return read_machine(path)
+
+
+def at_temperature(machine: TipSource, celsius: float | None) -> TipSource:
+    """Return the machine at a temperature [°C]; errors name the option."""
+    try:
+        return machine.at_temperature(celsius)
+    except InputError as error:
+        raise InputError("--temperature-c", error.found, error.allowed) from None
 
 
 def read_identified(path: Path) -> tuple[IdentifiedMachine, dict[str, Any]]:

@@ -29,12 +29,13 @@ from rcsa_ident.identification.diagnostics import (
     remarks,
     two_solutions,
 )
-from rcsa_ident.identification.further_unknowns import GRIP
+from rcsa_ident.identification.further_unknowns import GRIP, Warming
 from rcsa_ident.identification.joint_fit import AxisSearch
+from rcsa_ident.identification.learned_unknowns import changes_learned
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import evidence
-from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.posterior import Posterior, Warmed
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, MetTest, Standstill
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.unknowns import JOINT, CoupledLayout, Layout, ModalBlock, parameter_names, planes, unpack
@@ -185,6 +186,7 @@ class Fit(ABC):
             # the smooth errors stand behind them, unnamed
             coefficients=dict(zip(data.coefficients, scales, strict=False)),
             toolings=self._toolings(),
+            changes=changes_learned(data, solution, self.covariance),
         )
 
     @property
@@ -307,8 +309,18 @@ class PlaneFit(Fit):
                     "tooling_covariance": whole[np.ix_(rough, rough)],
                     "rival_toolings": (self.rival.theta[self._rough_entries(self.rival)] - self.rough_values,),
                 }
-            found.append(Posterior(told @ self.solution.theta, covariance, own, self.data.speed_range, (other,), **toolings))
+            more = self._warmed(i, told, whole)
+            found.append(Posterior(told @ self.solution.theta, covariance, own, self.data.speed_range, (other,), **toolings, warmed=more))
         return found
+
+    def _warmed(self, i: int, told: FloatArray, whole: FloatArray) -> Warmed | None:
+        """How an axis changes with what a thermometer shows."""
+        if not any(isinstance(each, Warming) and each.time_constant is None for each in self.data.further):
+            return None
+        own, rival = (_of_warming(planes(each.layout), i) for each in (self.solution, self.rival))
+        block = planes(self.rival.layout).axes[i]
+        other = self.rival.theta[rival] if block.warming else np.zeros(block.pairs)
+        return Warmed(self.solution.theta[own], told @ whole[:, own], whole[np.ix_(own, own)], (other,))
 
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
         """Return the reasons for `suspect` and the notes."""
@@ -323,6 +335,12 @@ class PlaneFit(Fit):
         if (data.tests or not data.of_flange) and len(data.axes) > 1:
             found.append(Remark(IdentificationCode.PLANES_NOT_ASKED, PLANES_NOT_ASKED))
         return reasons, found
+
+
+def _of_warming(layout: Layout, i: int) -> np.ndarray:
+    """Places of what an axis changes by as it warms up."""
+    block = layout.axes[i]
+    return layout.axis(i).start + np.arange(block.size)[block.parts["warming"]]
 
 
 def _told(layout: Layout, i: int, steady: float) -> tuple[FloatArray, ModalBlock]:

@@ -141,12 +141,13 @@ def further_unknowns(found: Explanation, data: IdentificationData) -> Further | 
         case Cause.CLAMPING:
             more = Grips(data.toolings)
         case Cause.TEMPERATURE:
-            if np.any(np.isnan(data.made.temperature)):
+            if not _followed(data):
                 return None
             more = Warming(ids, None)
         case Cause.TIME:
-            # the first way is an even course
-            more = Warming(ids, _CONSTANTS[max(found.way - 1, 0)] if found.way else _CONSTANTS[1])
+            # the first way is an even course, and a thermometer shows any better
+            constant = _CONSTANTS[max(found.way - 1, 0)] if found.way else _CONSTANTS[1]
+            more = Warming(ids, None if _followed(data) else constant)
         case _:
             return None
     return None if any(isinstance(each, type(more)) for each in data.further) else more
@@ -209,7 +210,7 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
     }
     loud = _loudness(solution, misfit)
     found[Cause.AMPLITUDE] = [[_AMPLITUDE * (stiffness[i].sum(axis=1) * loud[cut[i]])[:, None] for i in axes]]
-    if not np.any(np.isnan(data.made.temperature)):
+    if _followed(data):
         found[Cause.TEMPERATURE] = [drift(_spread_out(data.made.temperature))]
     places = [misfit.distance_place(i, layout) for i in axes]
     if None not in places:
@@ -233,8 +234,18 @@ def _loudness(solution: Solution, misfit: Misfit) -> FloatArray:
 
 
 def _courses(data: IdentificationData) -> list[FloatArray]:
-    """Ways in which the machine may change with time: evenly, and as heat of friction that it takes up, shape (k,) each."""
+    """Ways in which the machine may change with time: evenly, and as heat of friction that it takes up, shape (k,) each.
+
+    Of a machine whose temperature is known that heat is no course of its own.
+    """
+    if _followed(data):
+        return [_spread_out(data.made.started)]
     return [_spread_out(each) for each in (data.made.started, *(warmth(data, constant) for constant in _CONSTANTS))]
+
+
+def _followed(data: IdentificationData) -> bool:
+    """Whether a thermometer shows how warm the machine was at each cut."""
+    return not np.any(np.isnan(data.made.temperature)) and bool(np.ptp(data.made.temperature) > 0.0)
 
 
 def _spread_out(course: FloatArray) -> FloatArray:

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.plausibility import TEMPERATURE
 from rcsa_ident.base.units import to_hz
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
+from rcsa_ident.identification.learned_changes import LearnedWarming
 from rcsa_ident.identification.posterior import MachineAxis, PlaneUnknowns, Posterior
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.axial_flange import AxialFlange
@@ -28,6 +30,8 @@ from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
 
+#: Of the range of temperatures of its cuts, by which a machine is extrapolated to colder and to warmer ones.
+BEYOND = 0.5
 #: Unknowns times frequencies up to which the machine's side of the coupling is kept: 100 bytes each, 512 where planes feel each other.
 MOST_KEPT, MOST_KEPT_OF_BOTH = 1_000_000, 200_000
 
@@ -82,6 +86,10 @@ class IdentifiedMachine(Machine):
         What accelerometers on table or workpiece showed.
     axial : AxialFlange or None
         What an axial tap showed.
+    warming : LearnedWarming or None
+        How it changes as it warms up: it is the warm machine then.
+    temperature : float or None [°C]
+        At which it stands, of a machine that follows a thermometer; None is warm.
 
     Examples
     --------
@@ -108,6 +116,8 @@ class IdentifiedMachine(Machine):
     toolings: KnownToolings | None = None
     workpiece_side: WorkpieceSide | None = None
     axial: AxialFlange | None = None
+    warming: LearnedWarming | None = None
+    temperature: float | None = None
     kept_sides: tuple[Side, ...] = field(default=(), repr=False)
 
     @cached_property
@@ -185,7 +195,27 @@ class IdentifiedMachine(Machine):
         doubts = () if fine else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
         words = "" if self.workpiece_side is None else self.workpiece_side.words
         along = () if self.axial is None else self.axial.remarks(self.band)
-        return (*doubts, *([words] if words else []), *along)
+        return (*doubts, *([words] if words else []), *along, *self._beyond_temperatures)
+
+    @property
+    def _beyond_temperatures(self) -> tuple[str, ...]:
+        """That the cuts showed nothing of a temperature."""
+        known = None if self.warming is None else self.warming.thermometer
+        if known is None or self.temperature is None or known[0] <= self.temperature <= known[1]:
+            return ()
+        low, high = known
+        straight = f"the cuts were made at {low:.3g} to {high:.3g} °C: the straight line through them is extrapolated"
+        here = low + (1.0 + self._warmth(self.temperature)) * (high - low)
+        if abs(here - self.temperature) < 1e-9:
+            return (f"{straight} to {self.temperature:g} °C",)
+        return (f"{straight} to {here:.3g} °C alone, and at {self.temperature:g} °C the machine is taken as there",)
+
+    def _warmth(self, temperature: float) -> float:
+        """From -1 at the coldest cut to 0 at the warmest one, and no more than half of that beyond."""
+        assert self.warming is not None
+        assert self.warming.thermometer is not None
+        low, high = self.warming.thermometer
+        return float(np.clip((temperature - high) / (high - low), -1.0 - BEYOND, BEYOND))
 
     def posteriors(self) -> dict[Dof, Posterior]:
         """Return what is known of each axis by itself.
@@ -223,6 +253,26 @@ class IdentifiedMachine(Machine):
             return self
         model = self._model(speed)
         return model if model.softening_range is None else replace(model, speed=speed, kept_sides=())
+
+    def at_temperature(self, temperature: float | None) -> IdentifiedMachine:
+        """Return the machine at a temperature near the bearings [°C], by default warm; far beyond its cuts it stays as it is there."""
+        known = None if self.warming is None else self.warming.thermometer
+        if temperature is None or known is None or self.temperature is not None:
+            return cast(IdentifiedMachine, super().at_temperature(temperature))
+        TEMPERATURE.checked("temperature_c", temperature)
+        if self.speed_models:
+            raise InputError(
+                "temperature_c", f"{temperature:g} °C", "nothing: the models of single ranges of speeds are those of the warm machine"
+            )
+        axes = {axis: part.at_warmth(axis, self._warmth(temperature)) for axis, part in self.identified.items()}
+        return replace(self, identified=axes, temperature=temperature, kept_sides=())
+
+    def state(self, speed: float | None = None) -> str:
+        """Return for which state it answers, as ``warm machine, 14000 rev/min``; empty where it has one state alone."""
+        if self.warming is None:
+            return super().state(speed)
+        parts = ["warm machine" if self.temperature is None else f"at {self.temperature:g} °C", super().state(speed)]
+        return ", ".join(part for part in parts if part)
 
     def speed_answered(self, speed: float | None = None) -> float | None:
         """Return the spindle speed [rad/s] of what `at(speed)` answers; None where it does not change."""

@@ -69,11 +69,15 @@ class ModalParameters:
         known = [each for each in (self.warming, self.softening) if each.size]
         return np.vstack(known) if known else _none()
 
-    def at(self, x: float) -> ModalParameters:
-        """Return the warm machine at relative speed x (-1 and 1 are the campaign's lowest and highest), in its own modes there."""
-        if self.softening.size == 0:
+    def at(self, x: float, w: float = 0.0) -> ModalParameters:
+        """Return the machine at relative speed x (-1 and 1 are the campaign's lowest and highest) and warmth w, in its own modes there.
+
+        The warm machine has the warmth 0, the coldest one -1.
+        """
+        moved = [state * change for state, change in ((x, self.softening), (w, self.warming)) if change.size]
+        if not moved:
             return self
-        stiffness = np.outer(self.omega_n, self.omega_n) * (np.eye(self.order) + x * self.softening)
+        stiffness = np.outer(self.omega_n, self.omega_n) * (np.eye(self.order) + sum(moved))
         squares, turn = np.linalg.eigh(stiffness)
         return replace(
             self,

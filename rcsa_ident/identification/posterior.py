@@ -35,6 +35,31 @@ class PlaneUnknowns:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Warmed:
+    """How an axis' stiffness changes with its warmth: further unknowns, the lower triangle of `ModalParameters.warming` by rows.
+
+    `change`, shape (w,): the most probable ones
+    `cross`, shape (p, w): their covariance with the axis' other unknowns
+    `covariance`, shape (w, w)
+    `rivals`: tuple of array; the same of each rival, by the number of its modes
+    """
+
+    change: FloatArray
+    cross: FloatArray
+    covariance: FloatArray
+    rivals: tuple[FloatArray, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("change", "cross", "covariance"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "rivals", tuple(frozen(each) for each in self.rivals))
+        count = self.change.size
+        if self.covariance.shape != (count, count) or self.cross.shape[1:] != (count,):
+            found = f"{self.cross.shape} and {self.covariance.shape}"
+            raise InputError("warming", found, f"covariances of {count} unknowns, with the others and among themselves")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
     """Unknowns of one axis' flange and of the joint with their covariance.
 
@@ -47,6 +72,8 @@ class Posterior:
     `tooling_cross`, shape (p, u): covariance of the unknowns with what is known of toolings (`KnownToolings`), in its units
     `tooling_covariance`, shape (u, u): of that
     `rival_toolings`: tuple of array, shape (u,) each; how far each rival's toolings are from those
+    `warmed`: how it changes with a temperature that a thermometer shows; None where that is not known. All else is of the warm machine.
+    `warmth` [-]: at which a layout with warming stands, from -1 (cold) to 0 (warm)
     """
 
     theta: FloatArray
@@ -57,6 +84,8 @@ class Posterior:
     tooling_cross: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     tooling_covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     rival_toolings: tuple[FloatArray, ...] = ()
+    warmed: Warmed | None = None
+    warmth: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tooling_cross", frozen(self.tooling_cross))
@@ -82,7 +111,24 @@ class Posterior:
         layout = self.layout if vector.size == self.theta.size else self.layout_of(vector.size - JOINT)
         middle, half = self.speed_range
         x = 0.0 if speed is None or half == 0.0 else float(np.clip((speed - middle) / half, -1.0, 1.0))
-        return flange_modes(unpack(vector[:-JOINT], layout).at(x), axis), joint_of(vector[-JOINT:])
+        return flange_modes(unpack(vector[:-JOINT], layout).at(x, self.warmth), axis), joint_of(vector[-JOINT:])
+
+    def at_warmth(self, warmth: float) -> Posterior:
+        """Return the same where the machine is as warm as that, -1 (cold) to 0 (warm); itself where nothing is known of that."""
+        if self.warmed is None:
+            return self
+        layout, own = replace(self.layout, warming=True), self.warmed
+        count, place = own.change.size, self.layout.parts["softening"].start
+        if layout.pairs != count:
+            raise InputError("warming", count, f"{layout.pairs} unknowns for {layout.modes} modes")
+        # the vector's order: what changes with the warmth stands in front of what changes with the speed
+        turn = np.insert(np.arange(self.theta.size), place, self.theta.size + np.arange(count))
+        whole = np.block([[self.covariance, own.cross], [own.cross.T, own.covariance]])[np.ix_(turn, turn)]
+        rivals = []
+        for rival, change in zip(self.rivals, own.rivals, strict=True):
+            rivals.append(np.insert(rival, self.layout_of(rival.size - JOINT).parts["softening"].start, change))
+        theta = np.append(self.theta, own.change)[turn]
+        return replace(self, theta=theta, covariance=whole, layout=layout, rivals=tuple(rivals), warmed=None, warmth=warmth)
 
     def layout_of(self, size: int) -> ModalBlock:
         """Return the layout of a rival whose part without the joint has this size."""
@@ -139,6 +185,14 @@ class MachineAxis:
     spindle: Spindle
     joint: LumpedJoint
     posterior: Posterior | None = None
+
+    def at_warmth(self, axis: Dof, warmth: float) -> MachineAxis:
+        """Return the same axis where the machine is as warm as that, -1 (cold) to 0 (warm)."""
+        if self.posterior is None or self.posterior.warmed is None:
+            return self
+        posterior = self.posterior.at_warmth(warmth)
+        modes, joint = posterior.machine(axis)
+        return MachineAxis(Spindle(modes), joint, posterior)
 
     def at(self, axis: Dof, speed: float | None) -> tuple[ModalModel, LumpedJoint]:
         """Return modes and joint at a spindle speed [rad/s], by default the campaign's middle one."""

@@ -18,6 +18,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.hammer_lines import HammerLines
+from rcsa_ident.identification.learned_changes import LearnedChanges
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.progress import Step
@@ -163,6 +164,7 @@ class Identification(Shown):
     `learned`: the same in the terms of the campaign's drawings
     `workpiece_side`: what accelerometers on table or workpiece showed
     `predictions`: how the lines of each tooling are predicted by the other ones
+    `changes`: what was learned beyond the machine: warming, forces and joints that differ from what was told
     """
 
     status: Status
@@ -185,6 +187,7 @@ class Identification(Shown):
     learned: tuple[LearnedValue, ...] = ()
     workpiece_side: WorkpieceSide | None = None
     predictions: tuple[Prediction, ...] = ()
+    changes: LearnedChanges = field(default_factory=LearnedChanges)
 
     @property
     def at_minimum(self) -> bool:
@@ -222,6 +225,7 @@ class Identification(Shown):
             whole=self.whole,
             toolings=self.toolings,
             workpiece_side=self.workpiece_side,
+            warming=self.changes.warming,
         )
 
     def __str__(self) -> str:

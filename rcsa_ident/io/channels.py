@@ -9,6 +9,7 @@ import tempfile
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from rcsa_ident.io.validated_table import listed
 from rcsa_ident.signals.recording import LONGEST, Quantity
 from rcsa_ident.signals.told_units import seconds_in
 
-RATE = "sampling_rate_hz"
+RATE, STARTED = "sampling_rate_hz", "started"
 #: Columns of times in files of columns with names and nothing else: ``time`` in seconds, or with its unit behind.
 _TIME = re.compile(r"(?:time|t(?=_))(?:_(?P<unit>s|ms|us|ns))?", re.IGNORECASE)
 #: Of a file that is read as a whole, and of its channels as float64.
@@ -62,6 +63,7 @@ class Signals(list[Channel]):
     `units`: tuple of (str, Quantity or None). The unit that the file says of each channel, and what it measures: samples of a known
         quantity are in SI already, those of a voltage in volts. Empty where the file says none.
     `stored`: the unit that the file says of each channel whose samples stand in it, not in SI. Empty where the file says none.
+    `started`: when the first sample was taken, where the file says it
     """
 
     def __init__(
@@ -70,11 +72,18 @@ class Signals(list[Channel]):
         notes: tuple[Remark, ...] = (),
         units: tuple[tuple[str, Quantity | None], ...] = (),
         stored: tuple[str, ...] = (),
+        started: datetime | None = None,
     ) -> None:
         super().__init__(channels)
         self.notes = notes
         self.units = units
         self.stored = stored
+        self.started = started
+
+
+def started_of(channels: Sequence[Channel]) -> datetime | None:
+    """Return when a recording's first sample was taken, where its file says it."""
+    return channels.started if isinstance(channels, Signals) else None
 
 
 def notes_of(channels: Sequence[Channel]) -> tuple[Remark, ...]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.shown import Drawn, Shown
+from rcsa_ident.base.units import to_rpm
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.machine.axial_flange import AxialFlange
@@ -93,6 +94,26 @@ class TipSource(Shown, ABC):
         """Return what answers at a spindle speed [rad/s], by default at the middle of the speeds that it is known at."""
         del speed
         return self
+
+    def at_temperature(self, temperature: float | None) -> TipSource:
+        """Return what answers at a temperature near the bearings [°C], by default the warm machine.
+
+        Raises
+        ------
+        InputError
+            If it does not depend on a temperature, or the temperature is not possible.
+        """
+        if temperature is not None:
+            allowed = "nothing: it depends on no temperature; only a machine does whose cuts have `temperature_c`, and that warmed up"
+            raise InputError("temperature_c", f"{temperature:g} °C", allowed)
+        return self
+
+    def state(self, speed: float | None = None) -> str:
+        """Return for which state it answers, as ``warm machine, 14000 rev/min``; empty where it has one state alone.
+
+        `speed` [rad/s]: spindle speed; None where each speed has its own answer
+        """
+        return "" if speed is None else f"{to_rpm(speed):.0f} rev/min"
 
     def speed_answered(self, speed: float | None = None) -> float | None:
         """Return the spindle speed [rad/s] of what `at(speed)` answers, by default the middle one; None where it does not change."""

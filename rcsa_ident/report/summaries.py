@@ -229,6 +229,7 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
     lobes = advice.lobes
     return {
         "method": lobes.method,
+        "state": advice.state or None,
         "absolute_limit_mm": finite(lobes.absolute_limit, 1e3),
         "absolute_frequency_hz": None if lobes.absolute_frequency is None else to_hz(lobes.absolute_frequency),
         "best_speeds": [
@@ -286,6 +287,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
     return {
         "tooling": advice.tooling,
         "stickout_mm": None if advice.stickout is None else advice.stickout * 1e3,
+        "state": advice.state or None,
         "lowest_limit_mm": finite(float(advice.lobes.limit_depth.min()), 1e3),
         "common_stable_depth_mm": None if common is None else finite(float(common.min()), 1e3),
         "withheld": advice.lobes.withheld or None,

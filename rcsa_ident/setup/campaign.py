@@ -16,6 +16,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.passivity import Correction
 from rcsa_ident.setup.cut import Cut, Workpiece
+from rcsa_ident.setup.cut_course import course_remarks
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.signals.recording import Recording, Sensor, untold_distances
 
@@ -141,6 +142,7 @@ class Campaign(Shown):
         if self.workpiece is not None:
             found += [remark.of(self.workpiece.name) for remark in self.workpiece.coefficients.remarks]
         found += untold_distances(self.sensors)
+        found += course_remarks(self.cuts)
         cuts: dict[Remark, list[str]] = {}
         for cut in self.cuts:
             for remark in cut.remarks:

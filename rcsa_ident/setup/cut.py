@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, RUNOUT, SPINDLE_SPEED, remarks_of
+from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH, IMMERSION, RUNOUT, SPINDLE_SPEED, TEMPERATURE, remarks_of
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_rpm
@@ -194,6 +194,7 @@ class Cut(Shown):
                     ("spindle_speed_rpm", SPINDLE_SPEED, c.spindle_speed),
                     ("axial_depth_mm", AXIAL_DEPTH, c.axial_depth),
                     ("feed_per_tooth_mm", FEED_PER_TOOTH, c.feed_per_tooth),
+                    *((("temperature_c", TEMPERATURE, self.temperature),) if self.temperature is not None else ()),
                     *((("radial immersion", IMMERSION, c.engagement.immersion),) if isinstance(c.engagement, Engagement) else ()),
                 )
             )

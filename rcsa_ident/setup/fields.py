@@ -27,6 +27,7 @@ from rcsa_ident.base.plausibility import (
     SIDE,
     SPINDLE_SPEED,
     TANGENTIAL,
+    TEMPERATURE,
     WEAR_LAND,
     Range,
 )
@@ -350,7 +351,7 @@ CUT = (
     Field("posture", "posture_deg", Many(Number("deg", _DEGREE)), None,
           described="Of a robot's joints; an identification of the robot asks for it."),
     Field("started", "started", str, None, described="When the recording began, as 2026-11-27T08:15:00."),
-    Field("temperature", "temperature_c", Number("°C", 1.0, -40.0, 200.0), None, described="Near the spindle's bearings."),
+    Field("temperature", "temperature_c", TEMPERATURE, None, described="Near the spindle's bearings."),
     Field("validation", "validation", bool, False, described="The cut is predicted, and nothing is learned from it."),
 )  # fmt: skip
 #: What is done to a measured FRF, and what that is.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 
 import numpy as np
 
@@ -88,6 +89,7 @@ class Reading(Shown):
     `measurements`: one of a cut that keeps its speed, one for each window of a pass, none of a cut that is not usable
     `spindle_speed` [rad/s]: as found in the record, also in one that is not usable, unless nothing can be told of it
     `harmonics`: multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them
+    `started`: when the cut's recording began, where its file says it; `seconds`: how long it lasts
     """
 
     cut_id: str
@@ -97,6 +99,8 @@ class Reading(Shown):
     measurements: tuple[CutMeasurement, ...] = ()
     spindle_speed: float | None = None
     harmonics: Mapping[Dof, int] = field(default_factory=dict)
+    started: datetime | None = None
+    seconds: float = 0.0
 
     @property
     def measurement(self) -> CutMeasurement | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from enum import StrEnum
 
 import numpy as np
@@ -191,6 +192,8 @@ class Recording(Drawn):
     sensors : tuple of Sensor, length c
     notes : tuple of Remark
         What its reader says of the file: lossy, cut off.
+    started : datetime or None
+        When the first sample was taken, where the file says it.
 
     Examples
     --------
@@ -204,6 +207,7 @@ class Recording(Drawn):
     samples: FloatArray
     sensors: tuple[Sensor, ...]
     notes: tuple[Remark, ...] = ()
+    started: datetime | None = None
 
     def __post_init__(self) -> None:
         RATE.checked("sampling_rate_hz", self.rate)

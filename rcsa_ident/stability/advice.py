@@ -352,6 +352,8 @@ class Advice(Drawn):
     around : tuple of StabilityLobes
         Limits around the recommended cuts, by the method that computed them, with bands of their own: there they take the place of a
         preview.
+    state : str
+        For which state of the machine it holds, as ``warm machine``; empty where that has one alone.
 
     Examples
     --------
@@ -380,6 +382,7 @@ class Advice(Drawn):
     recommended_by: str | None = None
     band: BandShares | None = None
     around: tuple[StabilityLobes, ...] = ()
+    state: str = ""
 
     @property
     def preview(self) -> bool:

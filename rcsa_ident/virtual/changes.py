@@ -16,6 +16,8 @@ from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
 REFERENCE_SPEED = from_rpm(14_000.0)
 #: Heat capacity of the housing over that of all bearings, and conductance to the air over that from bearings to housing.
 _HOUSING_CAPACITY, _TO_THE_AIR = 6.0, 4.0
+#: Of a shop, and so of the cold machine [°C].
+AMBIENT = 22.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +30,8 @@ class Warming:
     `running`, `pause` [s]: in which the spindle turns for each cut, its way in the air included, and stands after it
     `warm_up` [s]: for which it turns at the middle speed before each tooling's first cut
     `shuffled`: whether the speeds come in random order
+    `rise` [K]: what a thermometer near the front bearings shows of a warmth of 1 over the ambient; None: the machine has none
+    `reading` [K]: standard deviation of what it shows
     """
 
     loss: float
@@ -37,6 +41,8 @@ class Warming:
     pause: float = 20.0
     warm_up: float = 0.0
     shuffled: bool = False
+    rise: float | None = None
+    reading: float = 0.2
 
     def __post_init__(self) -> None:
         if not -0.5 <= self.loss <= 0.5:
@@ -45,6 +51,9 @@ class Warming:
         positive("warming.running_s", self.running, "s")
         non_negative("warming.pause_s", self.pause, "s")
         non_negative("warming.warm_up_s", self.warm_up, "s")
+        if self.rise is not None:
+            positive("warming.rise_c", self.rise, "K")
+        non_negative("warming.reading_sd_c", self.reading, "K")
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,19 +114,21 @@ class Turn:
     `tooling`, `cut`: places in the campaign's toolings and in the plan's cuts
     `started` [s]: since the campaign began
     `warmth`: tuple of float [-], of each bearing: 1 where it is as warm as it becomes at `REFERENCE_SPEED`
+    `temperature` [°C]: that a thermometer near the front bearings shows; None without one
     """
 
     tooling: int
     cut: int
     started: float
     warmth: tuple[float, ...]
+    temperature: float | None = None
 
 
 def course_of(plan: CutPlan, spindle: VirtualSpindle, changes: Changes, toolings: int, seed: int) -> list[Turn]:
     """Return a campaign's cuts in the order in which they are made, with the warmth of the bearings in each.
 
     `toolings`: how many
-    `seed`: of the order of the speeds, where that is random
+    `seed`: of the order of the speeds, where that is random, and of what the thermometer shows
     """
     warming, bearings = changes.warming, len(spindle.bearings)
     order = [np.arange(len(plan.cuts)) for _ in range(toolings)]
@@ -126,7 +137,7 @@ def course_of(plan: CutPlan, spindle: VirtualSpindle, changes: Changes, toolings
     if warming.shuffled:
         rng = np.random.default_rng([seed, 77])
         order = [rng.permutation(each) for each in order]
-    state, now, found = np.zeros(bearings + 1), 0.0, []
+    state, now, found, chance = np.zeros(bearings + 1), 0.0, list[Turn](), np.random.default_rng([seed, 79])
     middle = 0.5 * (min(plan.programmed) + max(plan.programmed))
     for t, own in enumerate(order):
         state, now = _after(state, warming, middle, warming.warm_up), now + warming.warm_up
@@ -135,7 +146,10 @@ def course_of(plan: CutPlan, spindle: VirtualSpindle, changes: Changes, toolings
             # recorded in the middle of it
             speed = first if last is None else 0.5 * (first + last)
             state = _after(state, warming, speed, 0.5 * warming.running)
-            found.append(Turn(t, int(k), now + 0.5 * warming.running, tuple(state[:bearings].tolist())))
+            warmth = tuple(state[:bearings].tolist())
+            # the bearings are in the file from the flange on
+            shown = None if warming.rise is None else AMBIENT + warming.rise * warmth[0] + warming.reading * float(chance.normal())
+            found.append(Turn(t, int(k), now + 0.5 * warming.running, warmth, shown))
             state = _after(_after(state, warming, speed, 0.5 * warming.running), warming, 0.0, warming.pause)
             now += warming.running + warming.pause
     return found

@@ -106,6 +106,7 @@ def advise(
         found.by,
         None if best is None else _band_of(asked, best.spindle_speed, tolerance),
         found.around,
+        change.machine.state(),
     )
 
 

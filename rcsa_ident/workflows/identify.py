@@ -39,6 +39,7 @@ from rcsa_ident.tool_holder.learnt import learned
 from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
 from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.turning import turning_pair
+from rcsa_ident.workflows.cut_times import began, time_remarks
 
 #: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
 _STEP = 1e-5
@@ -88,8 +89,10 @@ def read_of(campaign: Campaign, cut: Cut, recording: Recording, air: Recording |
     """
     cutter = campaign.toolings[cut.tooling].cutter
     if cut.last_speed is None:
-        return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.coefficients)
-    return measure_pass(cut.id, cut.tooling, recording, air, cutter, cut.conditions, cut.last_speed, campaign.coefficients)
+        found = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.coefficients)
+    else:
+        found = measure_pass(cut.id, cut.tooling, recording, air, cutter, cut.conditions, cut.last_speed, campaign.coefficients)
+    return replace(found, started=recording.started, seconds=recording.samples.shape[0] / recording.rate)
 
 
 def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:
@@ -198,8 +201,9 @@ def of_campaign(
     side, told = workpiece_side(found, [each for reading in readings for each in reading.measurements], campaign.sensors)
     exact = () if found.toolings is not None or not campaign.rough else (Remark(IdentificationCode.DRAWINGS_EXACT, DRAWINGS_EXACT),)
     clock = clock_remark(readings)
-    said = (*(remark for test in tests for remark in test.remarks), *(() if clock is None else (clock,)))
-    notes = tuple(dict.fromkeys((*found.notes, *exact, *told, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids), *said)))
+    tested = (*(remark for test in tests for remark in test.remarks), *(() if clock is None else (clock,)))
+    said = (*told, *campaign.remarks, *time_remarks(campaign, readings), *campaign.cylinder_remarks(found.cut_ids), *tested)
+    notes = tuple(dict.fromkeys((*found.notes, *exact, *said)))
     drawings = {name: tooling.drawing for name, tooling in campaign.toolings.items()}
     values = () if found.toolings is None else learned(found.toolings, drawings)
     known = replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=values)
@@ -292,21 +296,20 @@ def _data_of_cuts(
     told = [(0.0, 0.0) if s is None or s.distance is None else (s.distance, s.distance_spread) for s in sensors]
     data = data if robot else with_distances(data, *np.array(told).reshape(-1, 2).T)
     known_places = not data.of_flange or all(s is not None and s.distance is not None for s in sensors)
-    made = _made(campaign, [each.cut_id for each in readings for _ in each.measurements])
+    made = _made(campaign, readings)
     if np.all(made.judged):
         raise InputError("cuts", "usable ones for validation alone", "at least one usable cut to learn from")
     return replace(data, softening_spread=campaign.softening_spread, distance_told=known_places, made=made)
 
 
-def _made(campaign: Campaign, ids: Sequence[str]) -> MadeCuts:
+def _made(campaign: Campaign, readings: Sequence[Reading]) -> MadeCuts:
     """When the cuts of the data were made, and which of them judge the answer."""
+    ids = [each.cut_id for each in readings for _ in each.measurements]
     cuts = {cut.id: cut for cut in campaign.cuts if cut.id in ids}
     warm = {id: cut.temperature for id, cut in cuts.items() if cut.temperature is not None}
-    began = {id: cut.started for id, cut in cuts.items() if cut.started is not None}
-    found = in_order(len(ids))
-    if all(id in began for id in ids):
-        first = min(began.values())
-        found = replace(found, started=np.array([(began[id] - first).total_seconds() for id in ids]))
+    found, times = in_order(len(ids)), began(campaign, [each for each in readings if each.measurements])
+    if times:
+        found = replace(found, started=np.array([times[id] for id in ids]))
     judged = np.array([id in cuts and cuts[id].validation for id in ids])
     # the forces of cuts that engage alike, with one feed per tooth, are wrong alike
     alike = [_kind(cuts[id]) if id in cuts else () for id in ids]

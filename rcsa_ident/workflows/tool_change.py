@@ -69,12 +69,14 @@ class TipAnswer:
 
     `remarks`: what the user should know
     `speed` [rad/s]: spindle speed that it holds at; None where it does not change
+    `state`: for which state of the machine it holds, in words; empty where it has one alone
     """
 
     tooling: Tooling
     tip: UncertainReceptance
     remarks: tuple[str, ...]
     speed: float | None = None
+    state: str = ""
 
 
 def tooltip(
@@ -106,7 +108,8 @@ def tooltip(
         top = to_hz(machine.band[1])
         remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
     remarks += tooling.cutter.cylinder_remarks()
-    return TipAnswer(tooling, tip, tuple(remarks), machine.speed_answered(speed))
+    answered = machine.speed_answered(speed)
+    return TipAnswer(tooling, tip, tuple(remarks), answered, machine.state(answered))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

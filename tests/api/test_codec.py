@@ -9,6 +9,7 @@ import pkgutil
 from abc import ABC
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from datetime import datetime
 from enum import Enum, StrEnum
 from functools import cache
 from types import NoneType, UnionType
@@ -53,6 +54,7 @@ LEAVES = st.one_of(
     st.complex_numbers(),
     st.text(),
     st.sampled_from(list(Dof)),
+    st.datetimes(timezones=st.none() | st.timezones()),
     st.builds(ModalBlock, st.integers(1, 9), st.booleans(), st.booleans()),
     st.builds(Verdict, st.lists(REMARKS, max_size=2).map(tuple), st.just(())),
     ARRAYS,
@@ -163,7 +165,25 @@ def test_a_remark_of_every_code():
 
 
 #: What is written without a noun. Of mappings and sequences those are that a question or an answer is made with; `Any` stands for JSON.
-PLAIN = {NoneType, bool, int, float, complex, str, np.ndarray, list, tuple, dict, Mapping, Sequence, Any, Ellipsis, Union, UnionType}
+PLAIN = {
+    NoneType,
+    bool,
+    int,
+    float,
+    complex,
+    str,
+    datetime,
+    np.ndarray,
+    list,
+    tuple,
+    dict,
+    Mapping,
+    Sequence,
+    Any,
+    Ellipsis,
+    Union,
+    UnionType,
+}
 
 
 def reached(kind: Any, seen: set[Any]) -> set[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from datetime import UTC, datetime
 
 import h5py
 import numpy as np
@@ -13,6 +14,7 @@ from api.reading.previews import envelope, spectrum
 from api.reading.samples import blocks, length, read_normalised, write_normalised
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.io.channels import Signals
 from rcsa_ident.io.recordings.readers import in_si
 from rcsa_ident.signals.recording import Quantity, Sensor
 
@@ -46,6 +48,14 @@ def test_samples_stay_as_they_were_to_the_last_bit(tmp_path, kind):
     assert np.isnan(found.samples[[7, 8], 0]).all() == ("f" in kind)
     # half the size where nothing is lost by it
     assert path.stat().st_size < 3 * 5000 * (4 if kind in ("f4", "i2", "u1", "exact f8") else 8) + 20_000
+
+
+def test_when_it_was_recorded_stays(tmp_path):
+    at = datetime(2026, 1, 5, 8, tzinfo=UTC)
+    for started in (None, at):
+        write_normalised(tmp_path / "x.h5", 51200.0, Signals([np.ones(100)] * 3, started=started), SENSORS)
+        assert read_normalised(tmp_path / "x.h5").started == started
+        assert read_normalised(tmp_path / "x.h5", in_file=True).started == started
 
 
 @pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="a system that allocates nothing in advance")

@@ -8,7 +8,7 @@ import pytest
 
 from rcsa_ident.base import plausibility
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.plausibility import DIAMETER, IMMERSION, STICKOUT, TANGENTIAL, PlausibilityCode, Range, proportion
+from rcsa_ident.base.plausibility import DIAMETER, IMMERSION, STICKOUT, TANGENTIAL, TEMPERATURE, PlausibilityCode, Range, proportion
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -37,6 +37,8 @@ def test_what_is_usual_is_possible_and_both_ends_belong_to_it(name):
         (DIAMETER, 12e-6, "was it given in metres (12 mm)?"),
         (DIAMETER, 0.4e-3, "was it given in inches (10.16 mm)?"),
         (STICKOUT, 60.0, "was it given in µm (60 mm)?"),
+        (TEMPERATURE, 295.15, "was it given in kelvin (22 °C)?"),
+        (TEMPERATURE, 104.0, "was it given in degrees Fahrenheit (40 °C)?"),
         (TANGENTIAL, 2.1e6, "was it given in GPa (2100 MPa)?"),
         (TANGENTIAL, 2.1e15, "was it given in Pa (2100 MPa)?"),
         (TANGENTIAL, 2100.0, "was it given in MPa where Pa is asked for (2100 MPa)?"),

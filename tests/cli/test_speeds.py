@@ -139,3 +139,49 @@ def test_bad_speeds_and_spreads_are_refused(tmp_path, result_file, arguments, wo
     result = run(command, result_file, tmp_path / "T1.toml", "--out", tmp_path / "O.csv", *options, code=2)
     assert words in result.stderr
     assert not (tmp_path / "O.csv").exists()
+
+
+@pytest.fixture
+def warming_file(tmp_path):
+    path = tmp_path / "W.json"
+    path.write_text(by_hand.warming_text(tmp_path), encoding="utf-8")
+    return path
+
+
+def test_a_temperature_gives_the_machine_at_that_temperature(tmp_path, warming_file):
+    curves, warm = (tip(warming_file, tmp_path, "--speed", 6500, *more) for more in (("--temperature-c", 25), ()))
+    machine = machine_from_json(read_result(warming_file), "").at_temperature(25.0)
+    response = machine.at(6500.0 / RPM).tip(by_hand.campaign(tmp_path).toolings["T1"], 2.0 * np.pi * curves.frequency)
+    for row in response.rows:
+        axis = row.dof.upper()
+        np.testing.assert_allclose(curves.values[axis], response.between(str(row), str(row)), rtol=1e-10)
+        np.testing.assert_allclose(curves.bands[f"{axis}_re_std"], response.deviation()[row, row][0], rtol=1e-8)
+        assert np.linalg.norm(curves.values[axis] - warm.values[axis]) > 0.01 * np.linalg.norm(warm.values[axis])
+
+
+@pytest.mark.parametrize(
+    ("more", "told", "swept"),
+    [
+        (("--temperature-c", 25), "at 25 °C, 9549 rev/min, the middle of the speeds that were cut", "at 25 °C"),
+        ((), "warm machine, 9549 rev/min, the middle of the speeds that were cut", "warm machine"),
+    ],
+)
+def test_every_answer_says_for_which_state_it_holds(tmp_path, warming_file, more, told, swept):
+    asked = (warming_file, tmp_path / "T1.toml")
+    fast = ("--no-bands", *SPEEDS)
+    tooltip = ("tooltip", *asked, "--out", tmp_path / "F.csv", "--step", 100, *more)
+    over = ("lobes", *asked, "--out", tmp_path / "O.csv", *fast, *more)
+    assert told in run(*tooltip).stdout.splitlines()
+    assert json.loads(run(*tooltip, "--json").stdout)["state"] == told.partition(", the")[0]
+    assert swept in run(*over).stdout.splitlines()
+    assert json.loads(run(*over, "--json").stdout)["state"] == swept
+    advised = json.loads(run("advise", *asked, "--feed-per-tooth-mm", 0.1, *fast, *more, "--json").stdout)
+    assert [each["state"] for each in advised["toolings"]] == [swept]
+
+
+@pytest.mark.parametrize("command", ["tooltip", "lobes", "advise"])
+def test_a_temperature_that_changes_nothing_is_refused(tmp_path, result_file, command):
+    more = ("--feed-per-tooth-mm", 0.1) if command == "advise" else ("--out", tmp_path / "O.csv")
+    said = run(command, result_file, tmp_path / "T1.toml", *more, "--temperature-c", 24, code=2).stderr
+    assert "--temperature-c: found 24 °C, allowed is nothing: it depends on no temperature" in said
+    assert len(said.strip().splitlines()) == 1

@@ -16,3 +16,15 @@ def test_the_cause_is_learned(tmp_path, name, code, error):
     assert row["reasons"][0].startswith(code or "joint-unknown")
     assert max(row[kind]["error"] for kind in KINDS) < error
     assert min(row[kind]["band"] for kind in KINDS) > 0.55
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "code", "error"),
+    [("warming, with a clock", "drifts-with-time", 0.035), ("warming, with a thermometer", "drifts-with-temperature", 0.01)],
+)
+def test_times_and_temperatures_of_a_campaign_are_learned_from(tmp_path, name, code, error):
+    """Errors of this machine's tips were 0.027 and 0.0044 at worst."""
+    row = identified(tmp_path, 7102, name, 0.5, told=True)
+    assert any(each.startswith(f"{code}: natural frequencies changed") for each in row["reasons"])
+    assert max(row[kind]["error"] for kind in KINDS) < error

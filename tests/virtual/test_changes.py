@@ -1,6 +1,8 @@
 """What changes on a virtual machine from cut to cut: warmth against closed forms, joints and chips against their laws."""
 
 import dataclasses
+import tomllib
+from datetime import datetime
 
 import numpy as np
 import pytest
@@ -84,6 +86,35 @@ def test_the_order_is_random_only_where_it_shall_be_and_the_same_with_the_same_s
     assert [tooling for tooling, _ in one] == [0] * 9 + [1] * 9
     for changes in (Changes(), Changes(SOFT)):
         assert [(t.tooling, t.cut) for t in course_of(plan, spindle, changes, 2, 4)] == in_order
+
+
+def test_a_thermometer_shows_the_warmth_in_degrees_and_its_noise_has_a_seed(hpm):
+    plan, spindle = plan_of(hpm, *np.linspace(8000.0, 20_000.0, 40)), hpm.spindle
+    exact, noisy = dataclasses.replace(SOFT, rise=15.0, reading=0.0), dataclasses.replace(SOFT, rise=15.0, reading=0.5)
+    course = course_of(plan, spindle, Changes(exact), 2, 4)
+    np.testing.assert_allclose([turn.temperature for turn in course], [22.0 + 15.0 * turn.warmth[0] for turn in course])
+    one, same, other = (np.array([t.temperature for t in course_of(plan, spindle, Changes(noisy), 2, seed)]) for seed in (4, 4, 5))
+    np.testing.assert_array_equal(one, same)
+    off = one - [turn.temperature for turn in course]
+    assert 0.35 < np.std(off) < 0.65
+    assert not np.any(one == other)
+    assert {turn.temperature for turn in course_of(plan, spindle, Changes(SOFT), 1, 4)} == {None}
+
+
+def test_the_campaign_tells_when_its_cuts_began_and_how_warm_it_was(small):
+    """Each turn of 60 s is recorded in its middle and followed by a pause of 20 s."""
+    toolings = [read_tooling(path) for path in small.toolings]
+    found = tomllib.loads(campaign_text(dataclasses.replace(small, changes=Changes(dataclasses.replace(SOFT, rise=15.0))), toolings, 3))
+    began = [datetime.fromisoformat(cut["started"]) for cut in found["cuts"]]
+    assert [(each - began[0]).total_seconds() for each in began] == [80.0 * k for k in range(4)]
+    assert (began[0] - datetime(2026, 1, 5, 8)).total_seconds() == pytest.approx(30.0 - 0.5 * 0.06)
+    assert all(21.0 < cut["temperature_c"] < 40.0 for cut in found["cuts"])
+    blind, steady = (
+        tomllib.loads(campaign_text(dataclasses.replace(small, changes=each), toolings, 3)) for each in (Changes(SOFT), Changes())
+    )
+    assert [cut["started"] for cut in blind["cuts"]] == [cut["started"] for cut in found["cuts"]]
+    assert not any("temperature_c" in cut for cut in blind["cuts"])
+    assert not any("started" in cut for cut in steady["cuts"])
 
 
 def test_bearings_lose_their_share_of_stiffness_and_all_else_stays(hpm):
@@ -179,6 +210,8 @@ running_s = 30.0
 pause_s = 5.0
 warm_up_s = 60.0
 shuffled = true
+rise_c = 15.0
+reading_sd_c = 0.1
 [joint_changes]
 softening_percent = 20.0
 amplitude_um = 0.2
@@ -195,7 +228,7 @@ def test_a_machines_file_tells_them(hpm, machines_folder, tmp_path):
     path.write_text(text.replace("fixture_position_mm = 0.0", "fixture_position_mm = 0.0\nflange_position_mm = 30.0") + KEYS)
     found = read_machine(path)
     assert found.spindle.seen_at == pytest.approx(0.03)
-    assert found.changes.warming == Warming(0.06, 500.0, 1.5, 30.0, 5.0, 60.0, True)
+    assert found.changes.warming == Warming(0.06, 500.0, 1.5, 30.0, 5.0, 60.0, True, 15.0, 0.1)
     assert dataclasses.astuple(found.changes.joint) == pytest.approx((0.2, 2e-7, 0.03))
     assert dataclasses.astuple(found.changes.chip_law) == pytest.approx((-0.2, 1e-4))
     assert found.changes.of_the_machine
@@ -211,6 +244,8 @@ def test_a_machines_file_tells_them(hpm, machines_folder, tmp_path):
         ("loss_percent = 6.0\n", "", "warming.loss_percent"),
         ("time_constant_s = 500.0", "time_constant_s = 0.0", "warming.time_constant_s"),
         ("shuffled = true", 'shuffled = "yes"', "warming.shuffled"),
+        ("rise_c = 15.0", "rise_c = 0.0", "warming.rise_c"),
+        ("reading_sd_c = 0.1", "reading_sd_c = -0.1", "warming.reading_sd_c"),
         ("softening_percent = 20.0", "softening_percent = 100.0", "joint_changes.softening_percent"),
         ("amplitude_um = 0.2", "amplitude_um = -1.0", "joint_changes.amplitude_um"),
         ("[chip_law]\nexponent = -0.2", "[chip_law]\nexponent = 0.2", "chip_law.exponent"),
@@ -240,6 +275,8 @@ def test_a_sensor_looks_at_shaft_or_holder(machines_folder, tmp_path, millimetre
         (lambda: Warming(0.6), "loss"),
         (lambda: Warming(0.1, running=0.0), "running"),
         (lambda: Warming(0.1, pause=-1.0), "pause"),
+        (lambda: Warming(0.1, rise=0.0), "rise"),
+        (lambda: Warming(0.1, reading=-0.1), "reading"),
         (lambda: JointChanges(1.0), "softening"),
         (lambda: JointChanges(amplitude=0.0), "amplitude"),
         (lambda: JointChanges(reclamping=-0.1), "reclamping"),

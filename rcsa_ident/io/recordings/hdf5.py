@@ -11,6 +11,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, Signals, StoredChannel, the_only
+from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, STARTED, Channel, Signals, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, Bytes, existing_file, mapped, replacing
 from rcsa_ident.io.recordings.matlab_elements import wanted
 from rcsa_ident.io.validated_table import listed
@@ -52,8 +53,8 @@ _BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, 
 _LINKS = {h5py.h5l.TYPE_SOFT: "a soft link", h5py.h5l.TYPE_EXTERNAL: "a link to another file"}
 
 
-def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike]) -> None:
-    """Write channels as float32, contiguous, with the sampling rate on the root.
+def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike], started: datetime | None = None) -> None:
+    """Write channels as float32, contiguous, with the sampling rate on the root, and with the time of the first sample.
 
     `rate` [Hz]
     `channels`: mapping of name to array, shape (n,). In the units of the file: signal, not yet divided by a sensitivity. A lost sample is
@@ -69,6 +70,8 @@ def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike])
             raise InputError("channel", name, "a name without '/'", str(path))
     with replacing(path) as part, h5py.File(part, "w") as file:
         file.attrs[RATE] = float(rate)
+        if started is not None:
+            file.attrs[STARTED] = started.isoformat()
         for name, values in arrays.items():
             # times of writing would make equal recordings differ
             file.create_dataset(name, data=values, track_times=False)
@@ -92,7 +95,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
                 StoredChannel(dataset.size, partial(_part, path, name)) if dataset.size > LONGEST else dataset[()]
                 for name, dataset in zip(names, datasets, strict=True)
             ]
-            return rate, Signals(channels, stored=tuple(_unit(dataset) for dataset in datasets))
+            return rate, Signals(channels, stored=tuple(_unit(dataset) for dataset in datasets), started=_started(file))
     except InputError:
         raise
     except _BROKEN as error:
@@ -170,14 +173,27 @@ def _virtual(raw: Bytes, heaps: Sequence[int]) -> bool:
 
 
 def _unit(dataset: h5py.Dataset) -> str:
-    for name in ("unit", "units"):
-        if not h5py.h5a.exists(dataset.id, name.encode()):
-            continue
-        described = h5py.h5a.open(dataset.id, name.encode())
-        if described.dtype.kind in "SO" and math.prod(described.shape) == 1 and described.dtype.itemsize <= _LONGEST_UNIT:
-            text = np.ravel(dataset.attrs[name])[0]
-            return (text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text))[:_LONGEST_UNIT]
-    return ""
+    return next((text for text in (_text(dataset, name) for name in ("unit", "units")) if text is not None), "")
+
+
+def _started(file: h5py.File) -> datetime | None:
+    """When the first sample was taken; an attribute of that name that is no date and time is somebody else's."""
+    text = _text(file, STARTED) or ""
+    try:
+        return datetime.fromisoformat(text) if "T" in text else None
+    except ValueError:
+        return None
+
+
+def _text(item: h5py.File | h5py.Dataset, name: str) -> str | None:
+    """A short text that is an attribute, None where there is none."""
+    if not h5py.h5a.exists(item.id, name.encode()):
+        return None
+    described = h5py.h5a.open(item.id, name.encode())
+    if described.dtype.kind not in "SO" or math.prod(described.shape) != 1 or described.dtype.itemsize > _LONGEST_UNIT:
+        return None
+    text = np.ravel(item.attrs[name])[0]
+    return (text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text))[:_LONGEST_UNIT]
 
 
 def _part(path: Path, name: str, first: int, end: int) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.io.channels import LARGEST_DATA, Channel, Signals, StoredChannel, notes_of
+from rcsa_ident.io.channels import LARGEST_DATA, Channel, Signals, StoredChannel, notes_of, started_of
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.setup.cut import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
@@ -161,7 +161,7 @@ def recorded(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...
     """Return signals in SI as `in_si`, but leave those of a long recording where they are."""
     if any(isinstance(signal, StoredChannel) for signal in signals):
         _check_units(signals, sensors)
-        return Recording(rate, cast(FloatArray, StoredSamples(rate, signals, sensors)), sensors, notes_of(signals))
+        return Recording(rate, cast(FloatArray, StoredSamples(rate, signals, sensors)), sensors, notes_of(signals), started_of(signals))
     return in_si(rate, signals, sensors)
 
 
@@ -184,7 +184,7 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
     # an overflow in the acquisition is a lost sample like any other
     samples[np.isinf(samples)] = np.nan
     samples.setflags(write=False)
-    return Recording(rate, samples, sensors, notes_of(signals))
+    return Recording(rate, samples, sensors, notes_of(signals), started_of(signals))
 
 
 def _check_units(signals: Sequence[Channel], sensors: Sequence[Sensor]) -> None:
@@ -228,4 +228,4 @@ def write_recording(path: str | Path, recording: Recording) -> None:
 
     gains = [1.0 if s.quantity is Quantity.TRIGGER else s.sensitivity for s in recording.sensors]
     channels = zip(recording.sensors, recording.samples.T, gains, strict=True)
-    write_hdf5(path, recording.rate, {sensor.name: samples * gain for sensor, samples, gain in channels})
+    write_hdf5(path, recording.rate, {sensor.name: samples * gain for sensor, samples, gain in channels}, recording.started)

@@ -11,6 +11,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,8 @@ _SCALERS = {0x1269: 20, 0x126A: 17}
 _STRING = 0x20
 _WIDTHS = {1: 1, 2: 2, 3: 4, 4: 8, 5: 1, 6: 2, 7: 4, 8: 8, 9: 4, 10: 8, 0x19: 4, 0x1A: 8, 0x21: 1, 0x44: 16}
 _LEAD_IN = 28
+#: From which LabVIEW counts seconds; it has no stamp where its clock was never set.
+_EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
 
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
@@ -212,7 +215,7 @@ def _channels(file: Any, names: Sequence[str], default: float | None, size: int,
     if file.file_status.incomplete_final_segment or file.file_status.channel_statuses:
         raise InputError("recording", "a last segment that is not complete", COMPLETE, where)
     channels = [_values(channel, f"channel {name}", where) for name, channel in zip(names, found, strict=True)]
-    return rate, Signals(channels, stored=tuple(_unit(channel) for channel in found))
+    return rate, Signals(channels, stored=tuple(_unit(channel) for channel in found), started=_moment(found[0].properties))
 
 
 def _values(channel: Any, field: str, where: str) -> Channel:
@@ -291,3 +294,15 @@ def _start(properties: Mapping[str, Any], name: str, where: str) -> tuple[int, f
     if stamp is None:
         return 0, offset, "wf_start_offset" in properties
     return int(stamp.seconds), stamp.second_fractions * 2.0**-64 + offset, True
+
+
+def _moment(properties: Mapping[str, Any]) -> datetime | None:
+    """When a channel's first sample was taken; None where the file does not say it, or no date is so far away."""
+    stamp = properties.get("wf_start_time")
+    if stamp is None:
+        return None
+    try:
+        seconds = int(stamp.seconds) + float(stamp.second_fractions) * 2.0**-64 + properties.get("wf_start_offset", 0.0)
+        return _EPOCH + timedelta(seconds=seconds) if seconds > 0.0 else None
+    except OverflowError:
+        return None

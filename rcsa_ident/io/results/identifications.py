@@ -20,6 +20,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.unknowns import JOINT, ModalBlock
 from rcsa_ident.io.results.axial_flanges import axial_of
 from rcsa_ident.io.results.both_planes import both_planes_from_json, both_planes_to_json
+from rcsa_ident.io.results.changes import changes_to_json, warmed_of, warmed_to_json, warming_of
 from rcsa_ident.io.results.drawings import axis_toolings_of, axis_toolings_to_json, known_toolings_of, known_toolings_to_json
 from rcsa_ident.io.results.parts import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
 from rcsa_ident.io.results.workpiece_sides import workpiece_side_of, workpiece_side_to_json
@@ -80,6 +81,7 @@ def identification_to_json(
         **(
             {} if identification.toolings is None else {"toolings": known_toolings_to_json(identification.toolings, identification.learned)}
         ),
+        **({"learned": changes_to_json(identification.changes)} if identification.changes else {}),
         "axes": _axes_to_json(identification, deviations or {}),
         **_both_planes(identification, deviations or {}),
         **({} if identification.workpiece_side is None else {"workpiece_side": workpiece_side_to_json(identification.workpiece_side)}),
@@ -136,7 +138,7 @@ def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | N
         data["unknowns"] = posterior.theta.tolist()
         data["rivals"] = [rival.tolist() for rival in posterior.rivals]
         data["covariance"] = {"parameters": list(axis.parameters), "matrix": posterior.covariance.tolist()}
-        data |= axis_toolings_to_json(posterior)
+        data |= axis_toolings_to_json(posterior) | warmed_to_json(posterior)
     data["misfit"] = {"chi2_per_point": axis.chi2_per_point, "per_tooling": dict(axis.per_tooling)}
     data["model_error"] = axis.model_error
     if axis.standstill is not None:
@@ -225,6 +227,7 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         toolings=toolings,
         workpiece_side=workpiece_side_of(top),
         axial=axial_of(top),
+        warming=warming_of(top),
     )
 
 
@@ -275,7 +278,8 @@ def _posterior(axis: Table, toolings: KnownToolings | None) -> Posterior | None:
     speed_range = 0.5 * (low + high) / to_rpm(1.0), 0.5 * (high - low) / to_rpm(1.0)
     rivals = tuple(_rivals(axis, layout))
     of_toolings = axis_toolings_of(axis, toolings, len(unknowns), len(rivals))
-    return Posterior(np.array(unknowns), matrix, layout, speed_range, rivals, **of_toolings)
+    warmed = warmed_of(axis, len(unknowns), layout.pairs, len(rivals))
+    return Posterior(np.array(unknowns), matrix, layout, speed_range, rivals, **of_toolings, warmed=warmed)
 
 
 def _layout(axis: Table, size: int) -> ModalBlock:

@@ -50,7 +50,7 @@ _DISTURBANCES = (
     "speed_wander_percent", "wander_time_s", "clock_error_percent", "hum_um", "mains_hz", "machine_noise", "knocks_per_s", "knock_um",
 )  # fmt: skip
 
-_WARMING = ("loss_percent", "time_constant_s", "exponent", "running_s", "pause_s", "warm_up_s", "shuffled")
+_WARMING = ("loss_percent", "time_constant_s", "exponent", "running_s", "pause_s", "warm_up_s", "shuffled", "rise_c", "reading_sd_c")
 _JOINT_CHANGES = ("softening_percent", "amplitude_um", "reclamping_percent")
 STEADY = Changes()
 
@@ -172,6 +172,8 @@ def _changes(top: Table) -> Changes:
             table.number("pause_s", "s", 20.0, least=0.0),
             table.number("warm_up_s", "s", 0.0, least=0.0),
             table.flag("shuffled", False),
+            table.number("rise_c", "K", None, above=0.0, most=100.0),
+            table.number("reading_sd_c", "K", 0.2, least=0.0, most=20.0),
         )
     if "joint_changes" in top:
         table = top.table("joint_changes", _JOINT_CHANGES)

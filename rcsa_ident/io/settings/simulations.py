@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,14 @@ from rcsa_ident.io.settings.workpieces import workpiece_keys
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
-from rcsa_ident.virtual.changes import course_of
+from rcsa_ident.virtual.changes import Turn, course_of
 from rcsa_ident.virtual.machine import CutPlan
 from rcsa_ident.virtual.robot import robot_cut_id
 from rcsa_ident.virtual.sensors import accelerometer_places
 
 Progress = Callable[[int, int], None]
+#: When a machine that warms up begins its campaign.
+_FIRST = datetime(2026, 1, 5, 8)
 #: Files and rows of a campaign are named by its toolings: no folder elsewhere, no formula of a spreadsheet.
 _FILE_NAME = re.compile(r"\w[\w .+()-]*")
 
@@ -132,9 +135,19 @@ def campaign_text(setup: MachineFile, toolings: Sequence[Tooling], seed: int = 1
     plan = setup.plan
     # in the order in which they were made
     course = course_of(plan, setup.spindle, setup.changes, len(toolings), seed)
-    told = [(toolings[turn.tooling].name, *plan.cuts[turn.cut]) for turn in course]
-    cuts = [cut_keys(f"{tooling}-{name}", tooling, _conditions(plan, speed), last) for tooling, name, speed, last, _ in told]
+    cuts = []
+    for turn in course:
+        tooling, (name, speed, last, duration) = toolings[turn.tooling].name, plan.cuts[turn.cut]
+        told = _when(turn, duration) if setup.changes.warming is not None else {}
+        cuts.append(cut_keys(f"{tooling}-{name}", tooling, _conditions(plan, speed), last) | told)
     return _campaign_text(setup.name, setup, toolings, cuts)
+
+
+def _when(turn: Turn, duration: float) -> dict[str, Any]:
+    """When a recording began, of which the turn tells the middle, and how warm it was then."""
+    began = _FIRST + timedelta(seconds=turn.started - 0.5 * duration)
+    told: dict[str, Any] = {"started": began.isoformat(timespec="milliseconds")}
+    return told if turn.temperature is None else told | {"temperature_c": round(turn.temperature, 2)}
 
 
 def robot_campaign_text(name: str, setup: RobotSetup, toolings: Sequence[Tooling]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import h5py
@@ -11,7 +12,7 @@ import pytest
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.recordings.hdf5 import write_hdf5
-from rcsa_ident.io.recordings.readers import read_recording
+from rcsa_ident.io.recordings.readers import read_recording, write_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.hostile_hdf5 import (
     DATA,
@@ -167,3 +168,27 @@ def test_what_cannot_be_read_is_not_written(tmp_path, rate, channels, words):
     with pytest.raises(InputError, match=words):
         write_hdf5(tmp_path / "a.h5", rate, channels)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("attribute", "moment"),
+    [
+        ("2026-01-05T08:00:30.250", datetime(2026, 1, 5, 8, 0, 30, 250_000)),
+        ("2026-01-05T08:00:30+01:00", datetime(2026, 1, 5, 8, 0, 30, tzinfo=timezone(timedelta(hours=1)))),
+        # what others call so
+        ("2026-01-05", None),
+        ("yes", None),
+        (np.array([1.0, 2.0]), None),
+        ("2026-01-05T08:00:30" + 60 * "0", None),
+    ],
+)
+def test_a_file_says_when_it_was_recorded(tmp_path, attribute, moment):
+    path, sensor = tmp_path / "a.h5", Sensor("a", Quantity.TRIGGER)
+    write_hdf5(path, 1000.0, {"a": np.ones(10)})
+    assert read_recording(path, (sensor,)).started is None
+    with h5py.File(path, "r+") as file:
+        file.attrs["started"] = attribute
+    found = read_recording(path, (sensor,))
+    assert found.started == moment
+    write_recording(tmp_path / "b.h5", found)
+    assert read_recording(tmp_path / "b.h5", (sensor,)).started == moment

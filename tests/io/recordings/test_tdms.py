@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import tracemalloc
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -237,3 +238,14 @@ def test_a_text_of_the_file_stays_in_one_line(tmp_path):
         with pytest.raises(InputError) as caught:
             read_recording(tmp_path / "cut.tdms", (A,))
         assert "\n" not in str(caught.value)
+
+
+def test_a_file_says_when_it_was_recorded(tmp_path):
+    """`wf_start_time` is UTC; a clock that was never set says nothing."""
+    at = np.datetime64("2026-01-05T08:00:00.25")
+    tdms(tmp_path / "a.tdms", 1000.0, {"a": RAMP}, wf_start_time=at, wf_start_offset=0.5)
+    assert read_recording(tmp_path / "a.tdms", (A,)).started == datetime(2026, 1, 5, 8, 0, 0, 750_000, tzinfo=UTC)
+    tdms(tmp_path / "b.tdms", 1000.0, {"a": RAMP})
+    assert read_recording(tmp_path / "b.tdms", (A,)).started is None
+    tdms(tmp_path / "c.tdms", 1000.0, {"a": RAMP}, wf_start_time=np.datetime64("1904-01-01T00:00:00"))
+    assert read_recording(tmp_path / "c.tdms", (A,)).started is None

@@ -208,3 +208,67 @@ def test_sensors_come_back_with_role_and_mount(tmp_path, found):
     write_result(tmp_path / "S.json", identification_to_json(replace(found, sensors=told.sensors), told, []))
     read = machine_from_json(read_result(tmp_path / "S.json"), "S.json")
     assert next(sensor for sensor in read.sensors if sensor.name == "felt_x") == felt
+
+
+def warming_file(folder, softening=False, **changed):
+    data = identification_to_json(by_hand.warming_identification(softening), by_hand.campaign(folder), by_hand.LEFT_OUT)
+    write_result(folder / "W.json", data | changed)
+    return folder / "W.json"
+
+
+def test_what_was_learned_comes_back(tmp_path, softening):
+    path = warming_file(tmp_path, softening)
+    read, wrote = machine_from_json(read_result(path), str(path)), by_hand.warming_identification(softening).machine
+    assert read.warming == wrote.warming
+    for axis, part in wrote.identified.items():
+        there, here = part.posterior.warmed, read.identified[axis].posterior.warmed
+        for name in ("change", "cross", "covariance"):
+            np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
+        np.testing.assert_array_equal(here.rivals[0], there.rivals[0])
+    omega = 2.0 * np.pi * np.linspace(300.0, 3000.0, 50)
+    found, expected = (each.at_temperature(25.0).tip(by_hand.tooling(), omega) for each in (read, wrote))
+    np.testing.assert_allclose(found.values, expected.values, rtol=1e-12)
+    for pair, deviation in expected.deviation().items():
+        np.testing.assert_allclose(found.deviation()[pair], deviation, rtol=1e-9)
+
+
+def test_the_file_says_what_was_learned(tmp_path):
+    learned = read_result(warming_file(tmp_path))["learned"]
+    assert learned["in_words"] == list(by_hand.CHANGES.words)
+    assert learned["warming"] == pytest.approx(
+        {"by": "temperature", "frequency_percent": -5.0, "frequency_std_percent": 0.2, "coldest_c": 22.0, "warmest_c": 38.0}
+    )
+    assert [(each["axis"], each["kind"], each["order"]) for each in learned["force_orders"]] == [("X", 1, 4), ("X", 1, 8)]
+    assert learned["force_orders"][0]["percent"] == pytest.approx(-6.0)
+    assert learned["force_orders"][0]["angle_deg"] == pytest.approx(math.degrees(0.02))
+    assert learned["joints"]["T1"] == pytest.approx({"percent": 4.0, "std_percent": 1.56})
+    assert learned["force_scales"].keys() == {"T1-0", "T1-1"}
+
+
+def test_a_file_of_what_was_not_learned_says_nothing(path):
+    data = read_result(path)
+    assert "learned" not in data
+    assert "warming" not in data["axes"]["X"]
+    assert machine_from_json(data, str(path)).warming is None
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "field"),
+    [
+        (("learned", "warming", "by"), "clock", "learned.warming.by"),
+        (("learned", "warming", "warmest_c"), 22.0, "learned.warming.warmest_c"),
+        (("learned", "warming", "frequency_std_percent"), -1.0, "learned.warming.frequency_std_percent"),
+        (("axes", "X", "warming", "unknowns"), [0.1], "axes.X.warming.unknowns"),
+        (("axes", "X", "warming", "cross"), [[0.1]], "axes.X.warming.cross"),
+        (("axes", "X", "warming", "covariance"), 1.0, "axes.X.warming.covariance"),
+        (("axes", "X", "warming", "rivals"), [], "axes.X.warming.rivals"),
+    ],
+)
+def test_what_does_not_fit_of_it_is_named(tmp_path, at, value, field):
+    data = read_result(warming_file(tmp_path))
+    place = data
+    for key in at[:-1]:
+        place = place[key]
+    place[at[-1]] = value
+    with pytest.raises(InputError, match=field.replace(".", r"\.")):
+        machine_from_json(data, "W.json")

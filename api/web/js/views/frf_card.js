@@ -4,7 +4,6 @@ import { chart, legend, SERIES } from "../charts.js";
 import { card, choices, h, save } from "../dom.js";
 import { across, frfFigure } from "../figures.js";
 import { failed } from "../forms.js";
-import { plain } from "../units.js";
 
 /** The card; `look` says which parts and directions are shown, `look.keep()` that this has changed. */
 export function frfCard(found, body, look) {
@@ -16,7 +15,7 @@ export function frfCard(found, body, look) {
   const axes = Object.keys(found.tips[0].axes);
   const one = found.tips.length === 1;
   const crossed = across(found.tips[0]).map(([name]) => name);
-  const rpm = found.tips[0].spindle_speed_rpm;
+  const { spindle_speed_rpm: rpm, state } = found.tips[0];
   const keys = one
     ? [
         ...axes.map((name, k) => ({ name: `${name} direction`, series: SERIES[k] })),
@@ -79,7 +78,8 @@ export function frfCard(found, body, look) {
       { class: "small soft" },
       "Shaded: 95 % band.",
       crossed.length ? " XY: motion in X under a force in Y." : null,
-      rpm ? ` At ${plain(rpm)} rev/min, the middle of the speeds that were cut: it changes with the speed, and the lobes take each speed's own.` : null,
+      state ? ` For: ${state}.` : null,
+      rpm ? " This is the middle of the speeds that were cut: the machine changes with the speed, and the lobes take each speed's own." : null,
     ),
     place,
   );

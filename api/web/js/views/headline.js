@@ -96,6 +96,7 @@ export function headline(found, question) {
           )
         : null,
       heldBack(best, told(found, i).recommended_by, false),
+      told(found, i).state ? h("p", { class: "soft small" }, `For: ${told(found, i).state}.`) : null,
       bandOf(found, i),
       drawing,
       question.tip ? null : cardLink(lobes.tooling),

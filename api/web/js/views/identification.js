@@ -7,7 +7,7 @@ import { kindOf, RUNNING, shareOf, wordsOf } from "../jobs.js";
 import { to } from "../router.js";
 import { allMachines } from "../state.js";
 import { costFigure, fitFigure } from "./identification_figures.js";
-import { coupling, drawings, modesCards, notes } from "./modes.js";
+import { coupling, drawings, learned, modesCards, notes } from "./modes.js";
 
 export async function view({ id }, _query, place) {
   let job = await get(`identifications/${id}`);
@@ -137,7 +137,7 @@ export async function view({ id }, _query, place) {
       over = true;
       fit.draw(() => fitFigure(measured(frf)));
       if (job.status !== "failed") await allMachines(true);
-      fill(result, outcome(modes), coupling(modes), h("div", { class: "modes" }, modesCards(modes), drawings(modes), notes(modes)));
+      fill(result, outcome(modes), coupling(modes), h("div", { class: "modes" }, learned(modes), modesCards(modes), drawings(modes), notes(modes)));
       fill(
         reports,
         job.status === "failed" ? null : link(to("change", { machine: job.machine }), "Change the tool", "button primary"),

@@ -10,7 +10,7 @@ import { allMachines } from "../state.js";
 import { plain } from "../units.js";
 import { trail } from "./changes.js";
 import { contentsOf } from "./forgotten.js";
-import { coupling, modesCards, notes } from "./modes.js";
+import { coupling, learned, modesCards, notes } from "./modes.js";
 
 const JSON_TYPE = "application/json";
 const CSV = "text/csv";
@@ -69,7 +69,7 @@ export async function view({ id }, _query, place) {
       h(
         "div",
         { class: modes ? "split" : "view" },
-        modes && h("div", { class: "view" }, modesCards(modes)),
+        modes && h("div", { class: "view" }, learned(modes), modesCards(modes)),
         h(
           "div",
           { class: "view" },

@@ -12,6 +12,23 @@ export function coupling(modes) {
   return words ? note("", `${words}.`) : null;
 }
 
+/** What was learned beyond the modes: warming, forces and joints that differ from what was told. */
+export function learned(modes) {
+  if (!modes.learned.length) return null;
+  const box = card(
+    "Learned beyond the modes",
+    null,
+    h(
+      "ul",
+      null,
+      modes.learned.map((each) => h("li", null, each)),
+    ),
+    h("p", { class: "small soft" }, "Modes, tooltip FRFs and limits are those of the warm machine, where it warms up."),
+  );
+  box.classList.add("wide");
+  return box;
+}
+
 const outside = (rows, band) =>
   rows.some(({ mode }) => !within(mode, band))
     ? h("p", { class: "small soft" }, `Outside: not in the band that the cuts excited, ${plain(band[0])} to ${plain(band[1])} Hz.`)

@@ -1,0 +1,94 @@
+"""`learned` of RESULT.json, and how an axis changes with a temperature: what was learned beyond the modes, out and in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rcsa_ident.identification.learned_changes import LearnedChanges, LearnedFactor, LearnedWarming
+from rcsa_ident.identification.posterior import Posterior, Warmed
+from rcsa_ident.io.validated_table import Table
+
+
+def changes_to_json(found: LearnedChanges) -> dict[str, Any]:
+    """Return the table `learned`; empty where nothing was learned."""
+    told: dict[str, Any] = {"in_words": list(found.words)} if found else {}
+    if found.warming is not None:
+        known = found.warming
+        warming = {
+            "by": "temperature" if known.thermometer else "time",
+            "frequency_percent": 100.0 * known.frequency,
+            "frequency_std_percent": 100.0 * known.deviation,
+            "time_constant_min": None if known.time_constant is None else known.time_constant / 60.0,
+            "speed_exponent": known.exponent,
+            "coldest_c": known.coldest,
+            "warmest_c": known.warmest,
+        }
+        told["warming"] = {key: value for key, value in warming.items() if value is not None}
+    if found.orders:
+        told["force_orders"] = [
+            {"axis": axis.upper(), "kind": kind + 1, "order": order} | _factor(each) | {"angle_deg": float(np.degrees(each.log.imag))}
+            for (axis, kind, order), each in found.orders.items()
+        ]
+    for key, factors in (("force_scales", found.scales), ("joints", found.joints)):
+        if factors:
+            told[key] = {name: _factor(each) for name, each in factors.items()}
+    return told
+
+
+def _factor(found: LearnedFactor) -> dict[str, float]:
+    return {"percent": 100.0 * found.share, "std_percent": 100.0 * (1.0 + found.share) * found.deviation}
+
+
+def warming_of(top: Table) -> LearnedWarming | None:
+    """Return how a result's machine warms up; None where it does not say so."""
+    table = top.table("learned", default={})
+    if "warming" not in table:
+        return None
+    known = table.table("warming")
+    by = known.text("by", choices=("time", "temperature"))
+    shares = known.number("frequency_percent", "%") * 1e-2, known.number("frequency_std_percent", "%", least=0.0) * 1e-2
+    if by == "time":
+        return LearnedWarming(*shares, known.number("time_constant_min", "min", above=0.0) * 60.0, known.number("speed_exponent"))
+    coldest, warmest = known.number("coldest_c", "°C"), known.number("warmest_c", "°C")
+    if not coldest < warmest:
+        known.refuse("warmest_c", f"{warmest:g}", f"above coldest_c, {coldest:g} [°C]")
+    return LearnedWarming(*shares, coldest=coldest, warmest=warmest)
+
+
+def warmed_to_json(posterior: Posterior) -> dict[str, Any]:
+    """Return how an axis changes with the temperature, beside its other unknowns; empty where it does not."""
+    known = posterior.warmed
+    if known is None:
+        return {}
+    rows = {"unknowns": known.change, "cross": known.cross, "covariance": known.covariance}
+    told = {name: each.tolist() for name, each in rows.items()}
+    return {"warming": told | {"rivals": [rival.tolist() for rival in known.rivals]}}
+
+
+def warmed_of(axis: Table, size: int, pairs: int, rivals: int) -> Warmed | None:
+    """Return the same of an axis.
+
+    `size`: of its other unknowns
+    `pairs`: entries of a lower triangle over its modes
+    `rivals`: how many it has
+    """
+    if "warming" not in axis:
+        return None
+    table = axis.table("warming")
+    change = np.array(table.numbers("unknowns", pairs))
+    cross, covariance = (_matrix(table, name, (count, pairs)) for name, count in (("cross", size), ("covariance", pairs)))
+    others = table.value("rivals", "a list of numbers for each rival", [])
+    if not isinstance(others, list) or len(others) != rivals:
+        table.refuse("rivals", f"{len(others) if isinstance(others, list) else 'no'} lists", f"{rivals}, one for each rival of the axis")
+    rows = [np.array(Table({"rivals": row}, table.where, table.path).numbers("rivals", None)) for row in others]
+    return Warmed(change, cross, covariance, tuple(rows))
+
+
+def _matrix(table: Table, name: str, shape: tuple[int, int]) -> np.ndarray:
+    allowed = f"{shape[0]} rows of {shape[1]} numbers"
+    rows = table.value(name, allowed)
+    if not isinstance(rows, list) or len(rows) != shape[0]:
+        table.refuse(name, f"{len(rows) if isinstance(rows, list) else 'no'} rows", allowed)
+    return np.array([Table({name: row}, table.where, table.path).numbers(name, shape[1]) for row in rows]).reshape(shape)
