@@ -3,7 +3,8 @@
 ``python -m benchmarks ideals``. Ten drawn machines (`benchmarks.machines`), 20 speeds with each of two toolings, no trigger, exact
 drawings, nothing told; of each one ideal is taken away at half the level at which it was first tried: the sensor looks behind the flange,
 the bearings warm up with speeds in order or at random, the force follows a curve of the chip while its straight line is told, or the
-joint gives way with amplitude and is clamped anew. Bearings that warm up are tried without a clock, with it, and with a thermometer.
+joint gives way with amplitude and is clamped anew. Bearings that warm up are tried without a clock, with it, and with a thermometer;
+`all` is sensor, bearings, chip law and joint together, with half an hour of warm-up before each tooling and random order.
 Errors of the tip are those of `benchmarks.comparison`, against the warm machine at 14 000 rev/min.
 
 Seeds: 7301 to 7310 for the figures, 7101 to 7103 for development; fixed on 2026-11-27, before anything of them was simulated. (7001 to 7008
