@@ -319,10 +319,10 @@ class EvidenceSelection:
 
         Both are compared among lines that are freed of what was learned.
         """
+        if not couplable(found.data) or found.data.beside:
+            return found
         lines = without_further(found.data, self.priors, found.solution)
         smooth = lines.with_smooth_errors(SMOOTH_ERROR)
-        if not couplable(smooth) or lines.beside:
-            return found
         misfit, points = found.misfit.with_data(smooth, found.misfit.cut_weight), coupled_data(smooth)
         apart = refine(misfit, *start_without_further(found.data, found.solution), 100)
         felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
