@@ -264,7 +264,11 @@ class Fit(ABC):
 
 @dataclass(frozen=True, eq=False)
 class PlaneFit(Fit):
-    """Each axis with its own machine. `searched`: one for each axis."""
+    """Each axis with its own machine.
+
+    `searched`: one for each axis
+    `deferred`: whether a cause explains what the planes seem to feel of each other, so that this was not asked
+    """
 
     data: IdentificationData
     searched: list[AxisSearch]
@@ -272,6 +276,7 @@ class PlaneFit(Fit):
     misfit: Misfit
     rival: Solution
     whole: IdentificationData | None = None
+    deferred: bool = False
 
     @property
     def wider(self) -> float:

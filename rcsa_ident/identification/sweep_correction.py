@@ -46,9 +46,11 @@ def unswept(data: IdentificationData, priors: Priors, theta: FloatArray, layout:
 def without_further(data: IdentificationData, priors: Priors, found: Solution) -> IdentificationData:
     """Return the data as a machine would give them that is warm at each speed, clamped alike, and cut with forces that are known.
 
-    `data`: with further unknowns, without smooth errors
+    `data`: without smooth errors; themselves where nothing further was learned
     `found`: of these data or of some of their cuts; what was learned
     """
+    if not data.further:
+        return data
     first, count = further_places(data)[0][1].start, len(data.coefficient_spread)
     layout = replace(planes(found.layout), coefficients=count, clampings=0)
     theta = found.theta[: layout.size]
@@ -90,16 +92,20 @@ def without_further(data: IdentificationData, priors: Priors, found: Solution) -
     )
 
 
-def start_without_further(data: IdentificationData, found: Solution) -> tuple[FloatArray, Layout, FloatArray]:
-    """Return where the fit of `without_further` with smooth errors begins: its unknowns, their layout, and the cuts' delays and angles."""
-    learned, old = slice(further_places(data)[0][1].start, len(data.coefficient_spread)), planes(found.layout)
+def start_without_further(data: IdentificationData, found: Solution, lines: IdentificationData) -> tuple[FloatArray, Layout, FloatArray]:
+    """Return where the fit of what `without_further` returns begins, with smooth errors: unknowns, layout, the cuts' delays and angles.
+
+    `data`, `found`: as there
+    `lines`: what it has returned, or the first of its outputs
+    """
+    learned, old = slice(len(lines.coefficient_spread), len(data.coefficient_spread)), planes(found.layout)
     blocks, parts = [], []
-    for own, block in zip(old.places, old.axes, strict=True):
+    for own, block, axis in zip(old.places, old.axes, lines.axes, strict=True):
         machine = unpack(found.theta[own], block)
         warms = block.warming and data.steady != 0.0
         if warms:
             machine = replace(machine, softening=data.steady * machine.warming + (machine.softening if block.softening else 0.0))
-        blocks.append(replace(block, warming=False, softening=block.softening or warms))
+        blocks.append(replace(block, places=axis.places, warming=False, softening=block.softening or warms))
         parts.append(pack(machine, blocks[-1]))
     layout = replace(old, axes=tuple(blocks), coefficients=old.coefficients - (learned.stop - learned.start))
     parts += [found.theta[old.joint], np.delete(found.theta[old.force], learned), found.theta[old.force.stop :]]

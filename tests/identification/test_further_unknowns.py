@@ -194,7 +194,7 @@ def test_lines_freed_of_what_was_learned_are_those_of_the_warm_machine(few, cons
     freed = without_further(made, Priors(), found)
     assert freed.further == ()
     assert freed.coefficient_spread == few.coefficient_spread
-    start, known, _ = start_without_further(made, found)
+    start, known, _ = start_without_further(made, found, freed)
     for axis, model in zip(freed.axes, Misfit(freed, Priors(), (1e-2, 1e-2)).models(start, known), strict=True):
         # a warmth of exactly nothing counts as 1e-9
         np.testing.assert_allclose(axis.lines[:, :, 0], model, rtol=1e-8)

@@ -147,6 +147,22 @@ def test_one_axis_alone_is_never_both(skewed, start, axis):
 
 
 @slow
+@pytest.mark.parametrize("kept_causes", [False, True])
+def test_coupling_that_a_cause_puts_off_is_asked_in_the_end(skewed, start, monkeypatch, kept_causes):
+    """Where the cause is refused, of the lines as they were; else of those that are freed of it."""
+    monkeypatch.setattr(method_module, "_has_a_cause", lambda *_: True)
+    if not kept_causes:
+        monkeypatch.setattr(method_module, "further_unknowns", lambda *_: None)
+    found = replace(METHOD, start=start).run(skewed.data, 102)
+    assert found.whole is not None
+    for tooling in skewed.shop.toolings.values():
+        tip = values(found.machine.at(12_000.0 * RPM).tip(tooling, TIP_OMEGA, spread=False))
+        true = skewed.shop.tips(tooling.assembly, 12_000.0 * RPM)
+        error = np.linalg.norm(tip - true, axis=0) / np.linalg.norm(np.einsum("nii->ni", true), axis=0)[:, None]
+        assert error.max() < 0.05
+
+
+@slow
 def test_axes_of_different_outputs_are_planes_apart(straight, start):
     """As before: the fixture's accelerometer of one axis only."""
     cuts, _ = straight.shop.measurements(np.random.default_rng(0), both_forces=True)

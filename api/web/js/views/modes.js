@@ -12,7 +12,7 @@ export function coupling(modes) {
   return words ? note("", `${words}.`) : null;
 }
 
-/** What was learned beyond the modes: warming, forces and joints that differ from what was told. */
+/** Card of what was learned beyond the modes: warming, and forces and joints that differ from the campaign. */
 export function learned(modes) {
   if (!modes.learned.length) return null;
   const box = card(
