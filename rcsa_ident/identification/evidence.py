@@ -123,9 +123,9 @@ class EvidenceSelection:
                 assert isinstance(found, PlaneFit | CoupledFit)
                 found = replace(found, whole=whole)
             if isinstance(found, PlaneFit) and not data.sweeps and not data.tests and data.rough is None:
-                found = self._freed(found, whole, sequence, map, trace, progress)
-                if found.data.further or found.deferred:
-                    found = self._asked_of_the_rest(found, map, _report_to(BOTH, trace, progress))
+                first, found = found, self._freed(found, whole, sequence, map, trace, progress)
+                if found.data.further or first.deferred:
+                    found = self._asked_of_the_rest(first, found, map, _report_to(BOTH, trace, progress))
             return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
@@ -311,33 +311,42 @@ class EvidenceSelection:
         smooth = unswept(data, self.priors, apart.theta, apart.layout).with_smooth_errors(SMOOTH_ERROR)
         if not couplable(smooth):
             return found
-        points = coupled_data(smooth)
-        felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
-        if felt.score <= STRIKES:
-            return found
-        together = self._together(data, points, felt, found.searched, apart.candidate, misfit, map, report)
-        return min(found, together, key=lambda fit: fit.evidence)
+        together = self._as_one(data, apart, misfit.with_data(smooth, misfit.cut_weight), found.searched, map, report)
+        return found if together is None else min(found, together, key=lambda fit: fit.evidence)
 
-    def _asked_of_the_rest(self, found: PlaneFit, map: Map, report: Report) -> Fit:
+    def _asked_of_the_rest(self, first: PlaneFit, found: PlaneFit, map: Map, report: Report) -> Fit:
         """Return the answer with what its lines asked for, or that of both planes as one machine where the rest still asks for that.
 
-        Both are compared among the flange's lines, freed of what was learned.
+        Both are compared among the flange's lines, freed of what was learned; and, where a cause has put off that question, among the
+        lines as they were.
+
+        `first`: the fit before anything was learned
         """
         if not couplable(found.data):
             return found
         freed = without_further(found.data, self.priors, found.solution)
         lines = freed.first()
-        smooth = lines.with_smooth_errors(SMOOTH_ERROR)
-        misfit, points = found.misfit.with_data(smooth, found.misfit.cut_weight), coupled_data(smooth)
+        misfit = found.misfit.with_data(lines.with_smooth_errors(SMOOTH_ERROR), found.misfit.cut_weight)
         apart = refine(misfit, *start_without_further(found.data, found.solution, lines), 100)
-        felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
-        if felt.score <= STRIKES:
+        together = self._as_one(lines, apart, misfit, found.searched, map, report)
+        if together is None:
             return found
-        together = self._together(lines, points, felt, found.searched, apart.candidate, misfit, map, report)
+        if found.data.further and first.deferred and not first.data.beside:
+            other = self._as_one(first.data, first.solution, first.misfit, first.searched, map, report)
+            if other is not None and other.evidence < found.evidence:
+                return replace(other, whole=first.whole)
         if together.evidence > evidence(apart, misfit):
             return found
         whole = None if found.whole is None else without_further(found.whole, self.priors, found.solution)
         return replace(together, data=freed, whole=whole, freed_of=tuple(learned(found.data, found.solution)))
+
+    def _as_one(
+        self, data: IdentificationData, apart: Solution, misfit: Misfit, searched: list[AxisSearch], map: Map, report: Report
+    ) -> CoupledFit | None:
+        """Return the fit of both planes as one machine; None where the misfit's lines do not ask for it at the fit of planes apart."""
+        points = coupled_data(misfit.data)
+        felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
+        return self._together(data, points, felt, searched, apart.candidate, misfit, map, report) if felt.score > STRIKES else None
 
     def _felt(self, points: CoupledData, apart: Candidate, model_error: tuple[float, ...], weight: FloatArray) -> Coupling:
         """Return what the lines say against planes that feel nothing of each other, with the noise that was learned."""
