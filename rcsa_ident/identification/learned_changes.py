@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rcsa_ident.cutting.force_law import ForceLaw
 from rcsa_ident.dynamics.coordinates import Dof
 
 
@@ -69,12 +70,14 @@ class LearnedChanges:
     `orders`: mapping of (axis, kind of cut, order of the spindle) to factor on the simulated force
     `scales`: mapping of cut to factor on its force
     `joints`: mapping of tooling to factor on the joint's stiffness
+    `law`: what stands behind `orders`; None where nobody asked
     """
 
     warming: LearnedWarming | None = None
     orders: Mapping[tuple[Dof, int, int], LearnedFactor] = field(default_factory=dict)
     scales: Mapping[str, LearnedFactor] = field(default_factory=dict)
     joints: Mapping[str, LearnedFactor] = field(default_factory=dict)
+    law: ForceLaw | None = None
 
     def __bool__(self) -> bool:
         return self.warming is not None or bool(self.orders or self.scales or self.joints)
@@ -83,6 +86,7 @@ class LearnedChanges:
     def words(self) -> tuple[str, ...]:
         """In sentences, those of forces for the lowest order of each axis and kind of cut."""
         told = [] if self.warming is None else [self.warming.words]
+        told += [self.law.words] if self.law is not None and self.law.words else []
         several = len({kind for _, kind, _ in self.orders}) > 1
         lowest: dict[tuple[Dof, int], int] = {}
         for axis, kind, order in self.orders:

@@ -40,11 +40,10 @@ from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_recep
 from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.turning import turning_pair
 from rcsa_ident.workflows.cut_times import began, time_remarks
+from rcsa_ident.workflows.kinds_of_cuts import kinds_of, with_law
 
 #: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
 _STEP = 1e-5
-#: Cuts of one engagement and feed that have factors of their own on their forces.
-_FEWEST_OF_A_KIND = 6
 #: Cuts from which on speeds beside the programmed ones say something, and by what share they lie beside them at least.
 _FEW_SPEEDS, _LEAST_CLOCK_ERROR = 5, 2e-4
 DRAWINGS_EXACT = (
@@ -207,7 +206,7 @@ def of_campaign(
     drawings = {name: tooling.drawing for name, tooling in campaign.toolings.items()}
     values = () if found.toolings is None else learned(found.toolings, drawings)
     known = replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes, learned=values)
-    return replace(known, workpiece_side=side)
+    return replace(known, workpiece_side=side, changes=with_law(found.changes, campaign, readings))
 
 
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:
@@ -311,19 +310,7 @@ def _made(campaign: Campaign, readings: Sequence[Reading]) -> MadeCuts:
     if times:
         found = replace(found, started=np.array([times[id] for id in ids]))
     judged = np.array([id in cuts and cuts[id].validation for id in ids])
-    # the forces of cuts that engage alike, with one feed per tooth, are wrong alike
-    alike = [_kind(cuts[id]) if id in cuts else () for id in ids]
-    known = {each: k for k, each in enumerate(dict.fromkeys(alike))}
-    kind = np.array([known[each] for each in alike])
-    # of few cuts a factor of their own is not told apart from the machine
-    kind = kind if np.min(np.bincount(kind)) >= _FEWEST_OF_A_KIND else np.zeros_like(kind)
-    return replace(found, temperature=np.array([warm.get(id, np.nan) for id in ids]), judged=judged, kind=kind)
-
-
-def _kind(cut: Cut) -> tuple[object, ...]:
-    """What is the same for cuts whose forces have one law."""
-    made = cut.conditions
-    return str(made.engagement), f"{made.feed_angle:.3g}", f"{made.feed_per_tooth:.3g}"
+    return replace(found, temperature=np.array([warm.get(id, np.nan) for id in ids]), judged=judged, kind=kinds_of(campaign, ids))
 
 
 def with_rough(

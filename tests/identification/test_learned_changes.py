@@ -127,6 +127,8 @@ def test_a_machine_without_a_thermometer_refuses_a_temperature():
 def test_it_is_said_in_words():
     assert by_hand.CHANGES.words == (
         "natural frequencies fall by up to 5 % from cold to warm, from 22 to 38 °C",
+        "the cutting coefficients follow the chip thickness with the exponent -0.08 ± 0.02; K_te differs by -1.9 ± 0.3 N/mm; teeth "
+        "enter by 0.57 ± 0.1 degrees later: this explains 79 % of the differences",
         "force in X at 4 times the spindle speed: 6 % lower than the model",
         "forces differ from cut to cut by 2 %",
         "joint stiffness of tooling T1: 4 % higher than the mean",

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.cutting.force_law import ForceLaw
 from rcsa_ident.identification.learned_changes import LearnedChanges, LearnedFactor, LearnedWarming
 from rcsa_ident.identification.posterior import Posterior, Warmed
 from rcsa_ident.io.validated_table import Table
@@ -31,10 +32,26 @@ def changes_to_json(found: LearnedChanges) -> dict[str, Any]:
             {"axis": axis.upper(), "kind": kind + 1, "order": order} | _factor(each) | {"angle_deg": float(np.degrees(each.log.imag))}
             for (axis, kind, order), each in found.orders.items()
         ]
+    if found.law is not None:
+        told["force_law"] = _law(found.law)
     for key, factors in (("force_scales", found.scales), ("joints", found.joints)):
         if factors:
             told[key] = {name: _factor(each) for name, each in factors.items()}
     return told
+
+
+def _law(found: ForceLaw) -> dict[str, Any]:
+    return {
+        "chip_exponent": _known(found.exponent),
+        "tangential_edge_n_per_mm": _known(found.tangential_edge, 1e-3),
+        "radial_edge_n_per_mm": _known(found.radial_edge, 1e-3),
+        "entry_deg": [{"kind": kind + 1} | _known(each, float(np.degrees(1.0))) for kind, each in found.entry.items()],
+        "explained_percent": 100.0 * found.explained,
+    }
+
+
+def _known(value: tuple[float, float], unit: float = 1.0) -> dict[str, float]:
+    return {"value": unit * value[0], "std": unit * value[1]}
 
 
 def _factor(found: LearnedFactor) -> dict[str, float]:

@@ -241,6 +241,11 @@ def test_the_file_says_what_was_learned(tmp_path):
     assert [(each["axis"], each["kind"], each["order"]) for each in learned["force_orders"]] == [("X", 1, 4), ("X", 1, 8)]
     assert learned["force_orders"][0]["percent"] == pytest.approx(-6.0)
     assert learned["force_orders"][0]["angle_deg"] == pytest.approx(math.degrees(0.02))
+    law = learned["force_law"]
+    assert law["chip_exponent"] == {"value": -0.08, "std": 0.02}
+    assert law["tangential_edge_n_per_mm"] == pytest.approx({"value": -1.9, "std": 0.3})
+    assert law["entry_deg"] == [{"kind": 1, "value": pytest.approx(math.degrees(0.01)), "std": pytest.approx(math.degrees(0.002))}]
+    assert law["explained_percent"] == pytest.approx(79.0)
     assert learned["joints"]["T1"] == pytest.approx({"percent": 4.0, "std_percent": 1.56})
     assert learned["force_scales"].keys() == {"T1-0", "T1-1"}
 
