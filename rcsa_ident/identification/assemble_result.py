@@ -29,7 +29,7 @@ from rcsa_ident.identification.diagnostics import (
     remarks,
     two_solutions,
 )
-from rcsa_ident.identification.further_unknowns import GRIP, Warming
+from rcsa_ident.identification.further_unknowns import GIVING_WAY, GRIP, GivingWay, Grips, Warming
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.learned_unknowns import changes_learned
 from rcsa_ident.identification.levenberg_marquardt import Solution
@@ -295,7 +295,9 @@ class PlaneFit(Fit):
     @cached_property
     def posteriors(self) -> list[Posterior]:
         """What is known of each axis and of the joint."""
-        return self._posteriors(self.covariance, GRIP if self.data.grip.size else 0.0)
+        # whoever clamps a tooling clamps it anew, and a tap moves it less than any cut
+        spreads = [{Grips: GRIP, GivingWay: GIVING_WAY}.get(type(each), 0.0) for each in self.data.further]
+        return self._posteriors(self.covariance, float(np.hypot.reduce(spreads, initial=0.0)))
 
     def _posteriors(self, whole: FloatArray, clamping: float = 0.0) -> list[Posterior]:
         layout, others = planes(self.solution.layout), planes(self.rival.layout)
@@ -304,7 +306,6 @@ class PlaneFit(Fit):
             told, own = _told(layout, i, self.data.steady)
             other = _told(others, i, self.data.steady)[0] @ self.rival.theta
             covariance = told @ whole @ told.T
-            # whoever clamps a tooling clamps it anew
             covariance[np.ix_(_CLAMPED, _CLAMPED)] += clamping**2
             toolings = {}
             if self.data.rough is not None:

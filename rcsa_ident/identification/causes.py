@@ -20,7 +20,17 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.data import LEVER, IdentificationData
-from rcsa_ident.identification.further_unknowns import CutScales, Further, Grips, Warming, order_factors, warmth
+from rcsa_ident.identification.further_unknowns import (
+    GIVING_WAY,
+    CutScales,
+    Further,
+    GivingWay,
+    Grips,
+    Warming,
+    loudness,
+    order_factors,
+    warmth,
+)
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.linearisation import Linearisation, Residual
 from rcsa_ident.identification.misfit import Misfit
@@ -35,8 +45,8 @@ ODDS = 0.1
 #: Time constants of the warmth that is asked for [s].
 _CONSTANTS = (450.0, 900.0, 1800.0)
 #: Spreads: of a natural frequency from the first to the last cut and over the speeds, of a cut's scale, of the force in an order of the
-#: teeth, of a clamping's joint stiffness, of that between quiet and loud cuts; and of where the flange's sensor looks [m].
-_DRIFT, _SCALE, _ORDER, _CLAMPING, _AMPLITUDE, _DISTANCE = 0.015, 0.03, 0.05, 0.06, 0.025, 20e-3
+#: teeth, of a clamping's joint stiffness; and of where the flange's sensor looks [m].
+_DRIFT, _SCALE, _ORDER, _CLAMPING, _DISTANCE = 0.015, 0.03, 0.05, 0.06, 20e-3
 
 
 class Cause(StrEnum):
@@ -140,6 +150,8 @@ def further_unknowns(found: Explanation, data: IdentificationData) -> Further | 
             more = CutScales(ids)
         case Cause.CLAMPING:
             more = Grips(data.toolings)
+        case Cause.AMPLITUDE:
+            more = GivingWay()
         case Cause.TEMPERATURE:
             if not _followed(data):
                 return None
@@ -208,8 +220,8 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
         Cause.SCALE: [by_key(cuts, [(_SCALE * real,) for real, _ in model])],
         Cause.CLAMPING: [[np.hstack([_CLAMPING * stiffness[i] * (tooling[i] == t)[:, None] for t in toolings]) for i in axes]],
     }
-    loud = _loudness(solution, misfit)
-    found[Cause.AMPLITUDE] = [[_AMPLITUDE * (stiffness[i].sum(axis=1) * loud[cut[i]])[:, None] for i in axes]]
+    loud = loudness(data)
+    found[Cause.AMPLITUDE] = [[GIVING_WAY * (stiffness[i].sum(axis=1) * loud[cut[i]])[:, None] for i in axes]]
     if _followed(data):
         found[Cause.TEMPERATURE] = [drift(_spread_out(data.made.temperature))]
     places = [misfit.distance_place(i, layout) for i in axes]
@@ -218,19 +230,6 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
         found[Cause.DISTANCE] = [_side_by_side(steps)]
     asked = {cause: [rows for rows in ways if any(np.any(each) for each in rows)] for cause, ways in found.items()}
     return {cause: ways for cause, ways in asked.items() if ways}
-
-
-def _loudness(solution: Solution, misfit: Misfit) -> FloatArray:
-    """How far the flange moves in each cut, as a logarithm in standard deviations about its mean, shape (k,).
-
-    The sensors' noise is much the same in all cuts: lines of a larger force have less of it.
-    """
-    squares = np.zeros(len(misfit.data.cut_ids))
-    for axis, model in zip(misfit.data.axes, solution.evaluation.models, strict=True):
-        np.add.at(squares, axis.cut, np.sum(np.abs(model) ** 2 / np.maximum(axis.variance, 1e-300), axis=1))
-    found = np.log(np.maximum(squares, 1e-300))
-    found -= found.mean()
-    return found / max(float(found.std()), 1e-300)
 
 
 def _courses(data: IdentificationData) -> list[FloatArray]:

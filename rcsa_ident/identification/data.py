@@ -214,8 +214,8 @@ class IdentificationData:
     `course`, shape (k, q): how that changes with each of what is not known of it
     `course_first`: where these begin among the coefficients
     `steady` [-]: how much warmer a warm machine is at the highest speed than at the middle one
-    `grip`: array of int, shape (k,) or (0,); where the logarithm of a factor on the joint's stiffnesses stands among the coefficients, of
-        each cut; -1 where there is none
+    `grip`, shape (k, q) or (0, 0): how the logarithm of the joint's stiffnesses changes in each cut with what stands at `grip_places`
+    `grip_places`: array of int, shape (q,), among the coefficients
     """
 
     cut_ids: tuple[str, ...]
@@ -244,7 +244,8 @@ class IdentificationData:
     course: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     course_first: int = 0
     steady: float = 0.0
-    grip: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    grip: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    grip_places: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
     def __post_init__(self) -> None:
         if self.made is None:

@@ -14,7 +14,15 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.causes import Cause, Causes
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.further_unknowns import TIME_SPREAD, CutScales, Grips, OrderFactors, Warming, further_places
+from rcsa_ident.identification.further_unknowns import (
+    TIME_SPREAD,
+    CutScales,
+    GivingWay,
+    Grips,
+    OrderFactors,
+    Warming,
+    further_places,
+)
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
@@ -240,6 +248,13 @@ def learned(data: IdentificationData, solution: Solution) -> list[Remark]:
                     f"the forces differ from cut to cut by {off:.2g} %: the identification has learned that; check the depth of the cuts"
                 )
                 told.append(Remark(_CAUSES[Cause.SCALE][0], words))
+            case GivingWay():
+                softer = 100.0 * abs(float(logs[place][0])) * float(np.ptp(data.grip[:, data.grip_places == place.start]))
+                words = (
+                    f"the joint's stiffness changes by {softer:.2g} % from the quietest to the loudest cut: the answer is that of cuts of "
+                    "middle loudness"
+                )
+                told.append(Remark(_CAUSES[Cause.AMPLITUDE][0], words))
             case Grips():
                 off = 100.0 * float(np.ptp(logs[place]))
                 words = (

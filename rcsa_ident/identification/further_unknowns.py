@@ -12,8 +12,8 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.identification.data import AxisData, IdentificationData
 from rcsa_ident.identification.made_cuts import USUAL_PAUSE
 
-#: Spreads: of the force in an order of the teeth, of a cut's scale, of a clamping's joint stiffness.
-ORDER, SCALE, GRIP = 0.1, 0.03, 0.08
+#: Spreads: of the force in an order of the teeth, of a cut's scale, of a clamping's joint stiffness, and of that with the cuts' loudness.
+ORDER, SCALE, GRIP, GIVING_WAY = 0.1, 0.03, 0.08, 0.025
 #: Exponent of the speed in the heat of friction; spreads of that, of the time constant's logarithm, and of a cut's warmth about its course.
 FRICTION, FRICTION_SPREAD, TIME_SPREAD, OFF_COURSE = 1.25, 0.2, float(np.log(2.0)), 0.04
 #: For which the spindle turns on at most where the next cut comes later [s].
@@ -70,10 +70,42 @@ class Grips:
 
     def on(self, data: IdentificationData) -> IdentificationData:
         """Return the same data with the factors' logarithms as further unknowns."""
-        first = len(data.coefficient_spread)
-        known = {name: first + k for k, name in enumerate(self.toolings)}
-        grip = np.array([known.get(data.toolings[t], -1) for t in data.cut_tooling], dtype=np.intp)
-        return replace(data.with_unknowns((GRIP,) * len(known), None), grip=grip, further=(*data.further, self))
+        own = np.equal.outer(np.array(data.toolings)[data.cut_tooling], np.array(self.toolings)).astype(float)
+        return _with_grip(data, own, GRIP, self)
+
+
+@dataclass(frozen=True, slots=True)
+class GivingWay:
+    """A joint that gives way with amplitude: its stiffnesses' logarithm changes with the loudness of the cut.
+
+    The answer is the machine in a cut of middle loudness.
+    """
+
+    def on(self, data: IdentificationData) -> IdentificationData:
+        """Return the same data with that change, for a standard deviation of the cuts' loudness, as a further unknown."""
+        return _with_grip(data, loudness(data)[:, None], GIVING_WAY, self)
+
+
+def _with_grip(data: IdentificationData, changes: FloatArray, spread: float, further: Grips | GivingWay) -> IdentificationData:
+    """The data whose joints change in each cut with further unknowns, a column each."""
+    first, count = len(data.coefficient_spread), changes.shape[1]
+    grip = np.hstack([data.grip, changes]) if data.grip.size else changes
+    places = np.append(data.grip_places, first + np.arange(count))
+    more = data.with_unknowns((spread,) * count, None)
+    return replace(more, grip=grip, grip_places=places, further=(*data.further, further))
+
+
+def loudness(data: IdentificationData) -> FloatArray:
+    """Return how far the flange moves in each cut, as a logarithm in standard deviations about its mean, shape (k,).
+
+    The sensors' noise is much the same in all cuts: lines of a larger force have less of it.
+    """
+    squares = np.zeros(len(data.cut_ids))
+    for axis in data.axes:
+        np.add.at(squares, axis.cut, np.abs(axis.measured) ** 2 / np.maximum(axis.noise, 1e-300))
+    found = np.log(np.maximum(squares, 1e-300))
+    found -= found.mean()
+    return found / max(float(found.std()), 1e-300)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +175,7 @@ def warmth(data: IdentificationData, time_constant: float, exponent: float = FRI
 
 
 #: What may be added to the data of an identification.
-Further = OrderFactors | CutScales | Grips | Warming
+Further = OrderFactors | CutScales | Grips | GivingWay | Warming
 
 
 def further_places(data: IdentificationData) -> list[tuple[Further, slice]]:
@@ -161,6 +193,8 @@ def _count(further: Further, data: IdentificationData) -> int:
             return len(ids)
         case Grips(toolings=names):
             return len(names)
+        case GivingWay():
+            return 1
     return data.course.shape[1]
 
 

@@ -70,6 +70,7 @@ class LearnedChanges:
     `orders`: mapping of (axis, kind of cut, order of the spindle) to factor on the simulated force
     `scales`: mapping of cut to factor on its force
     `joints`: mapping of tooling to factor on the joint's stiffness
+    `amplitude`: factor on the joint's stiffness from the quietest to the loudest cut
     `law`: what stands behind `orders`; None where nobody asked
     """
 
@@ -77,10 +78,11 @@ class LearnedChanges:
     orders: Mapping[tuple[Dof, int, int], LearnedFactor] = field(default_factory=dict)
     scales: Mapping[str, LearnedFactor] = field(default_factory=dict)
     joints: Mapping[str, LearnedFactor] = field(default_factory=dict)
+    amplitude: LearnedFactor | None = None
     law: ForceLaw | None = None
 
     def __bool__(self) -> bool:
-        return self.warming is not None or bool(self.orders or self.scales or self.joints)
+        return self.warming is not None or self.amplitude is not None or bool(self.orders or self.scales or self.joints)
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -98,4 +100,6 @@ class LearnedChanges:
         if self.scales:
             told.append(f"forces differ from cut to cut by {100.0 * float(np.std([each.log.real for each in self.scales.values()])):.2g} %")
         told += [f"joint stiffness of tooling {name}: {each.words} than the mean" for name, each in self.joints.items()]
+        if self.amplitude is not None:
+            told.append(f"joint stiffness in the loudest cut: {self.amplitude.words} than in the quietest")
         return tuple(told)

@@ -12,6 +12,7 @@ from rcsa_ident.identification.further_unknowns import (
     FRICTION_SPREAD,
     TIME_SPREAD,
     CutScales,
+    GivingWay,
     Grips,
     OrderFactors,
     Warming,
@@ -47,6 +48,9 @@ def changes_learned(data: IdentificationData, solution: Solution, covariance: Fl
                 found = replace(found, orders=told)
             case CutScales(cut_ids=names):
                 found = replace(found, scales=_factors(names, values, deviations))
+            case GivingWay():
+                louder = float(np.ptp(data.grip[:, data.grip_places == place.start]))
+                found = replace(found, amplitude=LearnedFactor(complex(louder * values[0]), louder * float(deviations[0])))
             case Grips(toolings=names):
                 found = replace(found, joints=_factors(names, values, deviations))
     return found

@@ -184,7 +184,7 @@ class Misfit:
             if layout.coefficients:
                 factor, slope = lines.force(theta[layout.force])
                 values *= factor[:, None]
-            changes = self._grips(i, layout), self._course(i, layout), self.data.course_place
+            changes = self._grips(i, layout), self.data.grip_places, self._course(i, layout), self.data.course_place
             felt = _Felt(seen, turned, self.distance_place(i, layout), points, *changes)
             answers.append(_AxisAnswer(values, kept, factor, slope, axis, part, both, toolings[i] if toolings else [], felt))
         return answers
@@ -195,9 +195,9 @@ class Misfit:
         points = lines.in_states[part.warming, part.softening]
         course = self._course(i, layout)
         if grips.size or course.size:
-            points, logs = points.copy(), np.append(theta[layout.force], 0.0)
+            points, logs = points.copy(), theta[layout.force]
             if grips.size:
-                points[:, 3] = np.exp(logs[grips])
+                points[:, 3] = np.exp(grips @ logs[self.data.grip_places])
             if course.size:
                 # the first of the states
                 points[:, 4] += course @ logs[self.data.course_place]
@@ -211,10 +211,11 @@ class Misfit:
         asked = layout.axes[i].warming and data.course.size and data.course_place.stop <= layout.coefficients
         return data.course[data.axes[i].cut] if asked else np.zeros((0, 0))
 
-    def _grips(self, i: int, layout: Unknowns) -> np.ndarray:
-        """Where what each line's joint is stiffer by stands among the coefficients, shape (n,); empty where all are alike."""
+    def _grips(self, i: int, layout: Unknowns) -> FloatArray:
+        """How the logarithm of each line's joint stiffness changes with what stands at `grip_places`, shape (n, q)."""
         grip = self.data.grip
-        return grip[self.data.axes[i].cut] if grip.size and np.max(grip) < layout.coefficients else np.zeros(0, dtype=np.intp)
+        asked = grip.size and np.max(self.data.grip_places) < layout.coefficients
+        return grip[self.data.axes[i].cut] if asked else np.zeros((0, 0))
 
     def seen_at(self, i: int, theta: FloatArray, layout: Unknowns) -> FloatArray:
         """Return how far behind the joint an axis' flange sensor looks, over the lever, and 1 where it looks at the holder, shape (2,)."""
@@ -410,7 +411,7 @@ class _Felt:
     `turned`, shape (n,): the slope there
     `place`: where what is not known of the former stands among the coefficients
     `points`, shape (n, 4 + s): as the kernel took them
-    `grips`, shape (n,): where what their joints are stiffer by stands
+    `grips`, shape (n, q): how the logarithms of their joints' stiffness change with what stands at `grip_places`
     `course`, shape (n, q): how their warmth changes with what stands at `course_place`
     """
 
@@ -418,7 +419,8 @@ class _Felt:
     turned: ComplexArray
     place: int | None
     points: FloatArray
-    grips: np.ndarray
+    grips: FloatArray
+    grip_places: np.ndarray
     course: FloatArray
     course_place: slice
 
@@ -456,10 +458,9 @@ class _AxisAnswer:
         if self.felt.place is not None:
             change = (weight * lines.shares[:, 0] * self.felt.turned[:, None]).ravel()
             out[own + self.felt.place] = np.concatenate([change.real, change.imag])
-        stiffer = np.tile(np.repeat(self.felt.grips, o), 2)
-        for place in np.unique(stiffer[stiffer >= 0]):
-            grip = stiffer == place
-            out[own + place, grip] = out[own - JOINT, grip] + out[own - JOINT + 1, grip]
+        if self.felt.grips.size:
+            stiffer = np.tile(np.repeat(self.felt.grips.T, o, axis=1), 2)
+            out[own + self.felt.grip_places] = stiffer * (out[own - JOINT] + out[own - JOINT + 1])
         if self.felt.course.size:
             # each of the warming's rows is the change with an entry, times the warmth
             entries = axis.warming[np.tril_indices(axis.order)] @ out[self.layout.parts["warming"]]

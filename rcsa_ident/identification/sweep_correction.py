@@ -88,7 +88,8 @@ def without_further(data: IdentificationData, priors: Priors, found: Solution) -
         warmth=np.zeros(0),
         course=np.zeros((0, 0)),
         steady=0.0,
-        grip=np.zeros(0, dtype=np.intp),
+        grip=np.zeros((0, 0)),
+        grip_places=np.zeros(0, dtype=np.intp),
     )
 
 

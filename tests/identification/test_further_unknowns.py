@@ -12,6 +12,7 @@ from rcsa_ident.identification.further_unknowns import (
     FRICTION,
     LONGEST_TURNING,
     CutScales,
+    GivingWay,
     Grips,
     Warming,
     further_places,
@@ -33,7 +34,7 @@ THETA = vector_of(PLAIN, ((600.0, 1400.0, 2600.0), (700.0, 1500.0, 2500.0)))
 
 def all_of(data, constant=900.0):
     data = replace(data, made=replace(data.made, temperature=20.0 + np.cos(np.arange(len(data.cut_ids)))))
-    for each in (order_factors(data), CutScales(data.cut_ids[1:]), Grips(data.toolings), Warming(data.cut_ids, constant)):
+    for each in (order_factors(data), CutScales(data.cut_ids[1:]), Grips(data.toolings), GivingWay(), Warming(data.cut_ids, constant)):
         data = each.on(data)
     return data
 

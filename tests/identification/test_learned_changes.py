@@ -11,7 +11,7 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.further_unknowns import CutScales, Grips, Warming, order_factors
+from rcsa_ident.identification.further_unknowns import CutScales, GivingWay, Grips, Warming, loudness, order_factors
 from rcsa_ident.identification.learned_changes import LearnedChanges, LearnedWarming
 from rcsa_ident.identification.learned_unknowns import changes_learned
 from rcsa_ident.identification.machine import SpeedModel
@@ -132,6 +132,7 @@ def test_it_is_said_in_words():
         "force in X at 4 times the spindle speed: 6 % lower than the model",
         "forces differ from cut to cut by 2 %",
         "joint stiffness of tooling T1: 4 % higher than the mean",
+        "joint stiffness in the loudest cut: 3 % lower than in the quietest",
     )
     assert BY_TIME.words == ("natural frequencies fall by up to 1.8 % from cold to warm, time constant 14 min",)
     assert not LearnedChanges()
@@ -142,7 +143,7 @@ def test_it_is_said_in_words():
 def test_it_is_read_from_the_unknowns(rich, constant):
     temperature = 20.0 + np.linspace(0.0, 10.0, len(rich.cut_ids))
     data = replace(rich, made=replace(rich.made, temperature=temperature))
-    for each in (order_factors(data), CutScales(data.cut_ids[1:]), Grips(data.toolings), Warming(data.cut_ids, constant)):
+    for each in (order_factors(data), CutScales(data.cut_ids[1:]), Grips(data.toolings), GivingWay(), Warming(data.cut_ids, constant)):
         data = each.on(data)
     blocks = tuple(ModalBlock(3, axis.places, warming=True) for axis in data.axes)
     layout = Layout(blocks, len(data.coefficient_spread), data.clampings)
@@ -169,6 +170,7 @@ def test_it_is_read_from_the_unknowns(rich, constant):
     vector[scales] = 0.03
     grips = scales + len(data.cut_ids) - 1
     vector[grips] = np.log(1.04)
+    vector[grips + len(data.toolings)] = -0.01
     changes = changes_learned(data, found, np.diag(np.arange(1.0, layout.size + 1) ** 2 * 1e-6))
     warming = changes.warming
     assert warming.frequency == pytest.approx(-0.5 * 0.04 * np.ptp(data.warmth))
@@ -181,5 +183,6 @@ def test_it_is_read_from_the_unknowns(rich, constant):
     assert first.deviation == pytest.approx(1e-3 * (start + 1))
     assert len(changes.orders) == len(orders)
     assert changes.scales[data.cut_ids[1]].log == pytest.approx(0.03)
+    assert changes.amplitude.log == pytest.approx(-0.01 * np.ptp(loudness(data)))
     assert changes.joints[data.toolings[0]].share == pytest.approx(0.04)
     assert changes_learned(rich, found, np.eye(layout.size)) == LearnedChanges()

@@ -37,6 +37,8 @@ def changes_to_json(found: LearnedChanges) -> dict[str, Any]:
     for key, factors in (("force_scales", found.scales), ("joints", found.joints)):
         if factors:
             told[key] = {name: _factor(each) for name, each in factors.items()}
+    if found.amplitude is not None:
+        told["joint_in_loudest_cut"] = _factor(found.amplitude)
     return told
 
 

@@ -247,6 +247,7 @@ def test_the_file_says_what_was_learned(tmp_path):
     assert law["entry_deg"] == [{"kind": 1, "value": pytest.approx(math.degrees(0.01)), "std": pytest.approx(math.degrees(0.002))}]
     assert law["explained_percent"] == pytest.approx(79.0)
     assert learned["joints"]["T1"] == pytest.approx({"percent": 4.0, "std_percent": 1.56})
+    assert learned["joint_in_loudest_cut"]["percent"] == pytest.approx(-3.0)
     assert learned["force_scales"].keys() == {"T1-0", "T1-1"}
 
 
