@@ -61,6 +61,9 @@ class IdentificationSummary(Answer):
     band_hz: list[float]
     toolings: list[str] = Field([], description="That it was identified with.")
     taught_by: list[str] = Field([], description="Campaigns of further toolings that have taught the machine, too.")
+    temperature_c: list[float] | None = Field(
+        None, description="Lowest and highest of the cuts, where the machine changes with the temperature near the bearings; else null."
+    )
     changed: str
     etag: str
 

@@ -71,7 +71,14 @@ def summary_of(data: dict[str, Any]) -> dict[str, Any]:
         "band_hz": data["band_hz"],
         "toolings": sorted({name for axis in data["axes"].values() for name in axis.get("misfit", {}).get("per_tooling", ())}),
         "taught_by": data.get("taught_by", []),
+        "temperature_c": _temperatures(data),
     }
+
+
+def _temperatures(data: dict[str, Any]) -> list[float] | None:
+    """Between which the cuts were made, of a machine that changes with the temperature."""
+    known = data.get("learned", {}).get("warming", {})
+    return [known["coldest_c"], known["warmest_c"]] if known.get("by") == "temperature" else None
 
 
 def modes(text: str) -> dict[str, Any]:

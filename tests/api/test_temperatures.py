@@ -45,12 +45,14 @@ def test_lobes_and_advice_say_their_state(shop, more, state):
 def test_what_was_learned_stands_beside_the_modes(shop):
     client, id = shop
     assert client.modes(id).learned == list(by_hand.CHANGES.words)
+    assert client.machine(id).identification.temperature_c == [22.0, 38.0]
 
 
 def test_a_temperature_that_changes_nothing_is_refused(client, tmp_path):
     id = client.make_machine("steady").id
     client.identify(id, by_hand.result_text(tmp_path))
     client.write_tooling("T1", by_hand.TOOLING)
+    assert client.machine(id).identification.temperature_c is None
     cuts = {"speeds": SPEEDS, "cut": CUT}
     for ask, more in ((client.tooltip, LINES), (client.lobes, cuts), (client.advice, cuts)):
         (error,) = refused(422, ask, id, "T1", **more, temperature_c=24.0).errors

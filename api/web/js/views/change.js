@@ -30,6 +30,7 @@ export async function view(_args, query, place) {
     address: () => on,
     // a measured flange says nothing of a workpiece
     material: here.identification.status === "measured" ? null : "As in the identification",
+    temperatures: here.identification.temperature_c,
     shaped: toolings.some((tooling) => tooling.shape !== "flat"),
   };
   const form = changeForm({ subject, materials, kinds, query, onchange: (now) => bench.changed(now) });

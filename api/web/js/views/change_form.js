@@ -9,14 +9,15 @@ const MOST = 12;
 /** The tooling that was written last is what somebody is working on. */
 const newest = (toolings) => toolings.reduce((last, each) => (each.changed >= last.changed ? each : last));
 /** What is folded away until an address says something of it. */
-const FURTHER = ["method", "material", "deep", "ktc", "krc", "kac", "runout", "land", "dent", "mu", "power", "torque"];
+const FURTHER = ["method", "material", "deep", "ktc", "krc", "kac", "runout", "land", "dent", "mu", "power", "torque", "temp"];
 
 /**
  * The form: `element`, `button`, `state()` for the address, `body()` for the service, `problem()`, `slow()`, `tested`, `tell()`.
  * `onchange(now)` is called when something else is asked.
  *
  * The subject is what is asked about: `element` to choose it by, `names()` of toolings, `faults()`, `body()` and `address()` of what they
- * stand on, `material` in words where that says which is cut, `shaped` where a cutter may be no cylinder.
+ * stand on, `material` in words where that says which is cut, `shaped` where a cutter may be no cylinder, `temperatures` of its cuts [°C]
+ * where it changes with these.
  */
 export function changeForm({ subject, materials, kinds, query, onchange }) {
   const fields = numberFields(NUMBERS, query);
@@ -82,7 +83,8 @@ export function changeForm({ subject, materials, kinds, query, onchange }) {
     ),
     h("fieldset", null, h("legend", { class: "unseen" }, "Speeds"), h("div", { class: "fields" }, fields.from, fields.to, fields.step)),
   );
-  const { ktc, krc, kac, power, torque, deep, land, dent, mu } = fields;
+  const { ktc, krc, kac, power, torque, deep, land, dent, mu, temp } = fields;
+  if (subject.temperatures) temp.input.placeholder = `${text("temperature", subject.temperatures[1])}: warm`;
   const element = h(
     "form",
     { class: "card change-form", novalidate: true },
@@ -95,7 +97,7 @@ export function changeForm({ subject, materials, kinds, query, onchange }) {
       field("Material", material, { name: "cut.material" }),
       source,
       field("Method", method, { name: "method" }),
-      h("div", { class: "fields" }, ktc, krc, shaped ? kac : null, power, torque, deep, fields.runout, land, dent, mu),
+      h("div", { class: "fields" }, ktc, krc, shaped ? kac : null, power, torque, deep, subject.temperatures ? temp : null, fields.runout, land, dent, mu),
       h(
         "p",
         { class: "small soft" },

@@ -31,6 +31,7 @@ export const NUMBERS = [
   ["mu", "none", 0.3, "cut.friction", 0, 2, "Friction of the worn land"],
   ["power", "power", null, "max_power_kw", 1e-3, 10_000, "Spindle power, at most"],
   ["torque", "torque", null, "max_torque_nm", 1e-3, 1e6, "Spindle torque, at most"],
+  ["temp", "temperature", null, "temperature_c", -20, 120, "Temperature near the bearings"],
 ];
 
 /** Which way the teeth enter, and where the feed goes, for choices. */
@@ -66,14 +67,15 @@ export function bodyOf(on, names, fields, { stock, strategy, direction, method, 
   if (value("runout") !== null) cut.runout_um = value("runout");
   if (material) cut.material = material;
   const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
-  const lobes = { ...on, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
+  const here = value("temp") === null ? on : { ...on, temperature_c: value("temp") };
+  const lobes = { ...here, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
   // the recommended cut does not depend on the method of the lobes beside it
   const advice = value("fz") === null ? null : { ...lobes, method: QUICK };
   if (advice && value("power") !== null) advice.max_power_kw = value("power");
   if (advice && value("torque") !== null) advice.max_torque_nm = value("torque");
   if (tested.length) lobes.tested = tested;
   // a tip's cutter has no name in the library
-  const tips = (names.length ? names : [null]).map((tooling) => (tooling === null ? { ...on } : { ...on, tooling }));
+  const tips = (names.length ? names : [null]).map((tooling) => (tooling === null ? { ...here } : { ...here, tooling }));
   return { lobes, advice, tips };
 }
 
