@@ -160,8 +160,7 @@ def errors_of(found: Identification, campaign: Campaign, machine: MachineFile, p
     write_result(path, identification_to_json(found, campaign, []))
     answer, truth = machine_from_json(read_result(path), str(path)), warm_machine(machine)
     # by a thermometer the warm machine is that of the warmest cut
-    follows = answer.warming is not None and answer.warming.thermometer is not None
-    standing = answer.at_temperature(AMBIENT + RISE if follows else None).at(REFERENCE_SPEED)
+    standing = answer.at_temperature(None if answer.thermometer is None else AMBIENT + RISE).at(REFERENCE_SPEED)
     omega = 2.0 * np.pi * FREQUENCY
     rows: dict[str, Any] = {}
     for kind, paths in zip(KINDS, (machine.toolings, *((each,) for each in machine.truth_toolings)), strict=True):

@@ -96,8 +96,8 @@ def read(text: str) -> Machine:
     ends = np.array([from_hz(LOWEST), 0.5 * identified.band[1] + 1.0, identified.band[1]])
     speeds = [None, *(0.5 * sum(model.speeds) for model in identified.speed_models)]
     machines = [identified.at(speed) for speed in speeds]
-    if identified.warming is not None and identified.warming.coldest is not None and not identified.speed_models:
-        machines.append(identified.at_temperature(identified.warming.coldest))
+    if identified.thermometer is not None and not identified.speed_models:
+        machines.append(identified.at_temperature(identified.thermometer[0]))
     if not all(_finite(each, ends) for each in machines):
         raise InputError("axes", "unknowns or modes without a finite receptance", "a machine that the reader of results can compute")
     return identified

@@ -77,7 +77,7 @@ def summary_of(data: dict[str, Any]) -> dict[str, Any]:
 
 def _temperatures(data: dict[str, Any]) -> list[float] | None:
     """Between which the cuts were made, of a machine that changes with the temperature."""
-    known = data.get("learned", {}).get("warming", {})
+    known = {} if data.get("both_planes") else data.get("learned", {}).get("warming", {})
     return [known["coldest_c"], known["warmest_c"]] if known.get("by") == "temperature" else None
 
 

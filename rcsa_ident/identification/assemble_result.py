@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -31,6 +31,7 @@ from rcsa_ident.identification.diagnostics import (
 )
 from rcsa_ident.identification.further_unknowns import GIVING_WAY, GRIP, GivingWay, Grips, Warming
 from rcsa_ident.identification.joint_fit import AxisSearch
+from rcsa_ident.identification.learned_changes import LearnedChanges
 from rcsa_ident.identification.learned_unknowns import changes_learned
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
@@ -153,6 +154,11 @@ class Fit(ABC):
         found = self.wider**2 * np.linalg.inv(self.solution.evaluation.hessian)
         return 0.5 * (found + found.T)
 
+    @cached_property
+    def changes(self) -> LearnedChanges:
+        """What was learned beyond the machine."""
+        return changes_learned(self.data, self.solution, self.covariance)
+
     def answer(self, seed: int, method: str) -> Identification:
         """Return the answer, without its trace. `method`: its name in a result file."""
         data, solution, misfit = self.data, self.solution, self.misfit
@@ -164,7 +170,7 @@ class Fit(ABC):
             notes = [not_judged(self.predictions), *notes]
         if not data.distance_told and len(self._compared) < ENOUGH_FOR_DISTANCE:
             notes = [Remark(IdentificationCode.DISTANCE_UNTOLD, DISTANCE_UNTOLD), *notes]
-        notes = [*learned(data, solution), *notes]
+        notes = [*learned(self.changes), *notes]
         if 2 * data.swept_cuts > data.cuts:
             reasons = [*reasons, Remark(IdentificationCode.MOSTLY_PASSES, MOSTLY_PASSES)]
         # wider bands do not make less known than was known before
@@ -186,7 +192,7 @@ class Fit(ABC):
             # the smooth errors stand behind them, unnamed
             coefficients=dict(zip(data.coefficients, scales, strict=False)),
             toolings=self._toolings(),
-            changes=changes_learned(data, solution, self.covariance),
+            changes=self.changes,
         )
 
     @property
@@ -380,7 +386,7 @@ class CoupledFit(Fit):
     misfit: Misfit
     rival: Solution
     whole: IdentificationData | None = None
-    freed_of: tuple[Remark, ...] = ()
+    freed_of: LearnedChanges = field(default_factory=LearnedChanges)
 
     @property
     def wider(self) -> float:
@@ -424,7 +430,12 @@ class CoupledFit(Fit):
             told.append(Remark(IdentificationCode.HOUSING_LEFT_OUT, HOUSING_LEFT_OUT))
         if self._gain_of_another_feed() > WORTH:
             told.append(Remark(IdentificationCode.ONE_FEED, ANOTHER_FEED))
-        return reasons, [*self.freed_of, *told, *found]
+        return reasons, [*told, *found]
+
+    @property
+    def changes(self) -> LearnedChanges:
+        """What was learned before."""
+        return self.freed_of
 
     def _turned(self) -> float:
         """By how much the mode that is turned most is turned out of X and Y [rad]."""

@@ -14,22 +14,14 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.causes import Cause, Causes
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.further_unknowns import (
-    TIME_SPREAD,
-    CutScales,
-    GivingWay,
-    Grips,
-    OrderFactors,
-    Warming,
-    further_places,
-)
 from rcsa_ident.identification.joint_fit import AxisSearch
+from rcsa_ident.identification.learned_changes import LearnedChanges
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING, FEWEST_TOOLINGS, Status
-from rcsa_ident.identification.unknowns import planes, unpack
+from rcsa_ident.identification.unknowns import planes
 from rcsa_ident.identification.validation import Prediction
 from rcsa_ident.machine.flange_part import JointedFlange
 
@@ -214,55 +206,31 @@ def because(found: Causes) -> list[Remark]:
     return told
 
 
-def learned(data: IdentificationData, solution: Solution) -> list[Remark]:
+def learned(found: LearnedChanges) -> list[Remark]:
     """Return what the identification has learned beyond the machine, and by how much that differs from what was told."""
-    logs = solution.theta[solution.layout.force]
     told = []
-    for each, place in further_places(data):
-        match each:
-            case Warming(time_constant=constant):
-                course = data.warmth + data.course @ logs[place]
-                softer = max(
-                    float(np.max(np.abs(np.diag(unpack(solution.theta[own], block).warming)), initial=0.0))
-                    for own, block in zip(solution.layout.places, planes(solution.layout).axes, strict=True)
-                )
-                share = 50.0 * softer * float(np.ptp(course))
-                way = "its temperature"
-                if constant is not None:
-                    minutes = constant * float(np.exp(TIME_SPREAD * logs[place][0])) / 60.0
-                    way = f"the heat of friction, with a time constant of {minutes:.2g} min"
-                words = (
-                    f"natural frequencies changed by up to {share:.2g} % while the machine followed {way}: the answer is the warm machine"
-                )
-                told.append(Remark(_CAUSES[Cause.TIME if constant else Cause.TEMPERATURE][0], words))
-            case OrderFactors(keys=keys):
-                off = 100.0 * float(np.sqrt(np.sum(logs[place] ** 2) / len(keys)))
-                words = (
-                    f"the forces differ from the simulated ones by {off:.2g} % in the orders of the teeth: the identification has learned "
-                    "that, lobes and monitored forces have not; check engagement and edge forces, or calibrate the coefficients"
-                )
-                told.append(Remark(_CAUSES[Cause.ORDER][0], words))
-            case CutScales():
-                off = 100.0 * float(np.std(logs[place]))
-                words = (
-                    f"the forces differ from cut to cut by {off:.2g} %: the identification has learned that; check the depth of the cuts"
-                )
-                told.append(Remark(_CAUSES[Cause.SCALE][0], words))
-            case GivingWay():
-                softer = 100.0 * abs(float(logs[place][0])) * float(np.ptp(data.grip[:, data.grip_places == place.start]))
-                words = (
-                    f"the joint's stiffness changes by {softer:.2g} % from the quietest to the loudest cut: the answer is that of cuts of "
-                    "middle loudness"
-                )
-                told.append(Remark(_CAUSES[Cause.AMPLITUDE][0], words))
-            case Grips():
-                off = 100.0 * float(np.ptp(logs[place]))
-                words = (
-                    f"the joint's stiffness differs by {off:.2g} % between toolings, as each clamping does: the answer is their mean, "
-                    "and bands allow as much for the next clamping"
-                )
-                told.append(Remark(_CAUSES[Cause.CLAMPING][0], words))
-    return told
+    if found.warming is not None:
+        cause = Cause.TIME if found.warming.thermometer is None else Cause.TEMPERATURE
+        told.append((cause, f"{found.warming.words}: the answer is the warm machine"))
+    if found.orders:
+        off = 100.0 * float(np.sqrt(np.mean([abs(each.log) ** 2 for each in found.orders.values()])))
+        words = (
+            f"the forces differ from the simulated ones by {off:.2g} % in the orders of the teeth: the identification has learned "
+            "that, lobes and monitored forces have not; check engagement and edge forces, or calibrate the coefficients"
+        )
+        told.append((Cause.ORDER, words))
+    if found.scales:
+        told.append((Cause.SCALE, f"{found.scales_in_words}: the identification has learned that; check the depth of the cuts"))
+    if found.amplitude is not None:
+        told.append((Cause.AMPLITUDE, f"{found.amplitude_in_words}: the answer is that of cuts of middle loudness"))
+    if found.joints:
+        off = 100.0 * float(np.ptp([each.log.real for each in found.joints.values()]))
+        words = (
+            f"the joint's stiffness differs by {off:.2g} % between toolings, as each clamping does: the answer is their mean, "
+            "and bands allow as much for the next clamping"
+        )
+        told.append((Cause.CLAMPING, words))
+    return [Remark(_CAUSES[cause][0], words) for cause, words in told]
 
 
 def not_as_predicted(found: Sequence[Prediction]) -> list[Remark]:

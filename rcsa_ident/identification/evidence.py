@@ -19,7 +19,7 @@ from rcsa_ident.identification.coupled.fit import coupled_starts, fit_coupled
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.score import STRIKES, Coupling, coupling
 from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
-from rcsa_ident.identification.diagnostics import failed, learned, not_finite
+from rcsa_ident.identification.diagnostics import failed, not_finite
 from rcsa_ident.identification.further_unknowns import Further, Warming
 from rcsa_ident.identification.joint_fit import (
     AxisSearch,
@@ -338,7 +338,7 @@ class EvidenceSelection:
         if together.evidence > evidence(apart, misfit):
             return found
         whole = None if found.whole is None else without_further(found.whole, self.priors, found.solution)
-        return replace(together, data=freed, whole=whole, freed_of=tuple(learned(found.data, found.solution)))
+        return replace(together, data=freed, whole=whole, freed_of=found.changes)
 
     def _as_one(
         self, data: IdentificationData, apart: Solution, misfit: Misfit, searched: list[AxisSearch], map: Map, report: Report

@@ -98,8 +98,19 @@ class LearnedChanges:
             known = self.orders[axis, kind, order]
             told.append(f"force in {axis.upper()} at {order} times the spindle speed{of}: {known.words} than the model")
         if self.scales:
-            told.append(f"forces differ from cut to cut by {100.0 * float(np.std([each.log.real for each in self.scales.values()])):.2g} %")
+            told.append(self.scales_in_words)
         told += [f"joint stiffness of tooling {name}: {each.words} than the mean" for name, each in self.joints.items()]
         if self.amplitude is not None:
-            told.append(f"joint stiffness in the loudest cut: {self.amplitude.words} than in the quietest")
+            told.append(self.amplitude_in_words)
         return tuple(told)
+
+    @property
+    def scales_in_words(self) -> str:
+        """By how much forces differ from cut to cut."""
+        return f"forces differ from cut to cut by {100.0 * float(np.std([each.log.real for each in self.scales.values()])):.2g} %"
+
+    @property
+    def amplitude_in_words(self) -> str:
+        """By how much the joint gives way in the loudest cut."""
+        assert self.amplitude is not None
+        return f"joint stiffness in the loudest cut: {self.amplitude.words} than in the quietest"

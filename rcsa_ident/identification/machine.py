@@ -198,9 +198,14 @@ class IdentifiedMachine(Machine):
         return (*doubts, *([words] if words else []), *along, *self._beyond_temperatures)
 
     @property
+    def thermometer(self) -> tuple[float, float] | None:
+        """Lowest and highest temperature [°C] of its cuts, where it changes with that; planes that feel each other are known warm alone."""
+        return None if self.warming is None or self.whole is not None else self.warming.thermometer
+
+    @property
     def _beyond_temperatures(self) -> tuple[str, ...]:
         """That the cuts showed nothing of a temperature."""
-        known = None if self.warming is None else self.warming.thermometer
+        known = self.thermometer
         if known is None or self.temperature is None or known[0] <= self.temperature <= known[1]:
             return ()
         low, high = known
@@ -212,9 +217,8 @@ class IdentifiedMachine(Machine):
 
     def _warmth(self, temperature: float) -> float:
         """From -1 at the coldest cut to 0 at the warmest one, and no more than half of that beyond."""
-        assert self.warming is not None
-        assert self.warming.thermometer is not None
-        low, high = self.warming.thermometer
+        assert self.thermometer is not None
+        low, high = self.thermometer
         return float(np.clip((temperature - high) / (high - low), -1.0 - BEYOND, BEYOND))
 
     def posteriors(self) -> dict[Dof, Posterior]:
@@ -256,8 +260,7 @@ class IdentifiedMachine(Machine):
 
     def at_temperature(self, temperature: float | None) -> IdentifiedMachine:
         """Return the machine at a temperature near the bearings [°C], by default warm; far beyond its cuts it stays as it is there."""
-        known = None if self.warming is None else self.warming.thermometer
-        if temperature is None or known is None or self.temperature is not None:
+        if temperature is None or self.thermometer is None or self.temperature is not None:
             return cast(IdentifiedMachine, super().at_temperature(temperature))
         TEMPERATURE.checked("temperature_c", temperature)
         if self.speed_models:

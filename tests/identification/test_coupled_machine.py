@@ -11,6 +11,7 @@ import pytest
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import directions
+from rcsa_ident.identification.learned_changes import LearnedWarming
 from rcsa_ident.identification.machine import MOST_KEPT_OF_BOTH
 from rcsa_ident.identification.modal_parameters import flange_modes
 from rcsa_ident.identification.unknowns import JOINT, ModalBlock, unpack
@@ -125,3 +126,12 @@ def test_it_travels_and_says_what_it_is():
     np.testing.assert_array_equal(again.tip(by_hand.tooling(), OMEGA).values, machine.tip(by_hand.tooling(), OMEGA).values)
     assert "X and Y together 4 modes" in str(machine)
     assert "changes with speed" in str(machine)
+
+
+def test_planes_that_feel_each_other_are_known_warm_alone():
+    machine = replace(coupled_by_hand.machine(), warming=LearnedWarming(-0.02, 0.001, coldest=22.0, warmest=38.0))
+    assert machine.thermometer is None
+    assert machine.state() == "warm machine"
+    assert machine.at_temperature(None) is machine
+    with pytest.raises(InputError, match="it depends on no temperature"):
+        machine.at_temperature(30.0)

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from rcsa_ident.base.remarks import says
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification import evidence as method_module
@@ -155,6 +156,8 @@ def test_coupling_that_a_cause_puts_off_is_asked_in_the_end(skewed, start, monke
         monkeypatch.setattr(method_module, "further_unknowns", lambda *_: None)
     found = replace(METHOD, start=start).run(skewed.data, 102)
     assert found.whole is not None
+    assert kept_causes or not found.changes
+    assert says(found.notes, IdentificationCode.FORCE_ORDERS) is bool(found.changes.orders)
     for tooling in skewed.shop.toolings.values():
         tip = values(found.machine.at(12_000.0 * RPM).tip(tooling, TIP_OMEGA, spread=False))
         true = skewed.shop.tips(tooling.assembly, 12_000.0 * RPM)
