@@ -49,6 +49,18 @@ SPEEDS = 20
 RISE = 18.0
 #: An error above which an answer must not be called converged.
 LARGEST = 0.05
+#: What the codes of remarks name.
+CAUSES = {
+    "sensor-distance": "distance",
+    "distance-untold": "distance",
+    "drifts-with-time": "time",
+    "drifts-with-temperature": "temperature",
+    "changes-with-speed": "speed",
+    "force-orders": "order",
+    "force-scales": "scale",
+    "clamped-anew": "clamping",
+    "joint-gives-way": "clamping",
+}
 KINDS, KEYS = ("cut", "same", "other"), ("machine", "ideal", "level", "told")
 
 
@@ -205,15 +217,9 @@ def identified(scratch: Path, seed: int, name: str, level: float, told: bool = F
 
 
 def named(row: dict[str, Any], cause: str) -> bool:
-    """Whether the first thing that is said of a run names the cause; of a sensor's untold distance, asks for it."""
-    first = {
-        "distance": ("sensor-distance", "distance-untold"),
-        "time": ("drifts-with-time",),
-        "temperature": ("drifts-with-temperature",),
-        "order": ("force-orders",),
-        "clamping": ("clamped-anew", "joint-gives-way"),
-    }
-    return bool(row["reasons"]) and row["reasons"][0].partition(":")[0] in first[cause]
+    """Whether the first cause that is said of a run, as a reason or as learned, is this one; of a sensor's untold distance, is asked for."""
+    said = [reason.partition(":")[0] for reason in row["reasons"]]
+    return next((CAUSES[code] for code in said if code in CAUSES), "") == cause
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
