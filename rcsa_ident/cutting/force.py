@@ -134,7 +134,7 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     >>> abs(lines).round(1).tolist()
     [[5.9, 20.8], [12.0, 32.6], [8.7, 15.0]]
     """
-    return unit_lines(cutter, conditions, orders) @ _values(coefficients)
+    return unit_lines(cutter, conditions, orders) @ unit_values(coefficients)
 
 
 def runout_force_lines(
@@ -159,7 +159,7 @@ def runout_force_lines(
     A tooth's chip is the smallest of as many a sin(phi) + b as there are teeth, where positive: between the angles at
     which two of them, or one and zero, meet, each line is the integral that `force_lines` takes.
     """
-    return unit_lines(cutter, conditions, orders, runout=True) @ _values(coefficients)
+    return unit_lines(cutter, conditions, orders, runout=True) @ unit_values(coefficients)
 
 
 def unit_lines(
@@ -206,8 +206,8 @@ def _unit_lines(rows: Rows, orders: np.ndarray, components: int) -> ComplexArray
     return lines
 
 
-def _values(coefficients: CuttingCoefficients) -> FloatArray:
-    """Coefficients in the order of `UNIT_NAMES`."""
+def unit_values(coefficients: CuttingCoefficients) -> FloatArray:
+    """Return coefficients in the order of `UNIT_NAMES`, shape (6,) [N/m^2, N/m^2, N/m, N/m, N/m^2, N/m]."""
     c = coefficients
     return np.array(
         [c.tangential, c.tangential * c.radial_ratio, c.tangential_edge, c.radial_edge, c.tangential * c.axial_ratio, c.axial_edge]
@@ -224,7 +224,7 @@ def force_and_slope(
         run-out in units of `REFERENCE_RUNOUT`, whose effect on the lines that all teeth share is a secant: teeth leave the material early.
         0 where there is no force.
     """
-    values = _values(coefficients)
+    values = unit_values(coefficients)
     parts = unit_lines(cutter, conditions, orders) * values
     total = parts.sum(axis=2)
     # no tooth stands where the eccentricity is 0 or largest
@@ -242,7 +242,7 @@ def axial_and_slope(
     `orders`: array of int, shape (m,); multiples of the spindle frequency
     Returns a complex array of shape (m,) [N], and one of the same shape for each term but the run-out; 0 where there is no force.
     """
-    parts = unit_lines(cutter, conditions, orders, axial=True)[:, 2] * _values(coefficients)
+    parts = unit_lines(cutter, conditions, orders, axial=True)[:, 2] * unit_values(coefficients)
     total = parts.sum(axis=1)
     change = {
         ForceTerm.TANGENTIAL: parts[:, 0] + parts[:, 1] + parts[:, 4],

@@ -19,7 +19,7 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import tooth_force, unit_lines
+from rcsa_ident.cutting.force import tooth_force, unit_lines, unit_values
 from rcsa_ident.cutting.rows import rows_of
 
 #: Chip at which K_tc is that of the straight line [m].
@@ -101,16 +101,14 @@ def law_changes(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     InputError
         As `cutting.force.force_lines`.
     """
-    known, arc = coefficients, conditions.engagement
-    values = np.array([1.0, known.radial_ratio, 0.0, 0.0, known.axial_ratio, 0.0]) * known.tangential
-    values += np.array([0.0, 0.0, known.tangential_edge, known.radial_edge, 0.0, known.axial_edge])
+    values, arc = unit_values(coefficients), conditions.engagement
     unit = unit_lines(cutter, conditions, orders)
     total = unit @ values
     change = np.zeros((*total.shape, 6), dtype=complex)
     change[..., 0] = unit[..., [0, 1, 4]] @ values[[0, 1, 4]]
     change[..., 1] = unit[..., 1] * values[1]
     change[..., 2] = _of_the_exponent(cutter, conditions, coefficients, orders)
-    change[..., 3:5] = known.tangential * unit[..., 2:4]
+    change[..., 3:5] = coefficients.tangential * unit[..., 2:4]
     if isinstance(arc, Engagement) and arc.entry > 0.0:
         later = replace(conditions, engagement=Engagement(min(arc.entry + _STEP, 0.5 * (arc.entry + arc.exit)), arc.exit))
         change[..., 5] = (unit_lines(cutter, later, orders) @ values - total) / _STEP
