@@ -217,7 +217,7 @@ def identified(scratch: Path, seed: int, name: str, level: float, told: bool = F
 
 
 def named(row: dict[str, Any], cause: str) -> bool:
-    """Whether the first cause that is said of a run, as a reason or as learned, is this one; of a sensor's untold distance, is asked for."""
+    """Whether the first cause that is said of a run, as a reason or as learned, is this one; an untold distance is asked for."""
     said = [reason.partition(":")[0] for reason in row["reasons"]]
     return next((CAUSES[code] for code in said if code in CAUSES), "") == cause
 
