@@ -5,7 +5,8 @@ With F_m the line that was simulated and e^{c_m} the factor on it that an identi
     (e^{c_m} - 1) F_m = sum_k x_k dF_m / dx_k
 
 is solved for what few physical unknowns x explain of many factors, weighted, with a prior for each: logarithms of K_tc and k_rc, the
-exponent e of a coefficient that follows the chip as K_tc (h / h_0)^e, both edge forces, and the angle by which teeth enter later.
+exponent e of a coefficient that follows the chip as K_tc (h / h_0)^e [altintas2012], both edge forces, and the angle by which teeth enter
+later.
 """
 
 from __future__ import annotations
@@ -110,8 +111,9 @@ def law_changes(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     change[..., 2] = _of_the_exponent(cutter, conditions, coefficients, orders)
     change[..., 3:5] = coefficients.tangential * unit[..., 2:4]
     if isinstance(arc, Engagement) and arc.entry > 0.0:
-        later = replace(conditions, engagement=Engagement(min(arc.entry + _STEP, 0.5 * (arc.entry + arc.exit)), arc.exit))
-        change[..., 5] = (unit_lines(cutter, later, orders) @ values - total) / _STEP
+        step = min(_STEP, 0.5 * (arc.exit - arc.entry))
+        later = replace(conditions, engagement=Engagement(arc.entry + step, arc.exit))
+        change[..., 5] = (unit_lines(cutter, later, orders) @ values - total) / step
     return np.divide(change, total[..., None], out=np.zeros_like(change), where=total[..., None] != 0.0)
 
 

@@ -23,6 +23,14 @@ def test_the_cause_is_learned(tmp_path, name, code, error):
 
 
 @pytest.mark.slow
+def test_a_joint_that_gives_way_is_learned(tmp_path):
+    """The joint of the virtual machine is softer in loud cuts; without that this machine's tips were wrong by 0.049, and are by 0.034."""
+    row = identified(tmp_path, 7101, "joint", 0.5, told=True)
+    assert any(each.startswith("joint-gives-way: joint stiffness in the loudest cut") and " % lower " in each for each in row["reasons"])
+    assert max(row[kind]["error"] for kind in KINDS) < 0.045
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "code", "error"),
     [("warming, with a clock", "drifts-with-time", 0.035), ("warming, with a thermometer", "drifts-with-temperature", 0.01)],
