@@ -219,13 +219,16 @@ def _cuts(machine: RoughMachine, cut: Sequence[str], seed: int) -> Iterator[Simu
         setup, tooling = machine.true[name]
         place = list(machine.toolings).index(name)
         for made in simulate(setup, [tooling], 1000 * seed + place):
-            yield replace(made, records={kind: _seen(machine, record) for kind, record in made.records.items()})
+            yield as_seen(machine, made)
 
 
-def _seen(machine: RoughMachine, record):
-    """A record by sensors whose gains are off and that feel a share of each other's direction."""
-    channels = dict(record.channels)
-    true = {axis: channels[f"flange_{axis}"] for axis in "xy"}
-    for (axis, other), gain, talk in zip(("xy", "yx"), machine.gains, machine.cross_talk, strict=True):
-        channels[f"flange_{axis}"] = (1.0 + gain) * (true[axis] + talk * true[other])
-    return replace(record, channels=channels)
+def as_seen(machine: RoughMachine, cut: SimulatedCut) -> SimulatedCut:
+    """Return a cut as recorded by sensors whose gains are off and that feel a share of each other's direction."""
+    records = {}
+    for kind, record in cut.records.items():
+        channels = dict(record.channels)
+        true = {axis: channels[f"flange_{axis}"] for axis in "xy"}
+        for (axis, other), gain, talk in zip(("xy", "yx"), machine.gains, machine.cross_talk, strict=True):
+            channels[f"flange_{axis}"] = (1.0 + gain) * (true[axis] + talk * true[other])
+        records[kind] = replace(record, channels=channels)
+    return replace(cut, records=records)

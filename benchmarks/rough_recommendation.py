@@ -21,12 +21,15 @@ from benchmarks.machines import CUT, HELD_OUT
 from benchmarks.page import DOCS, append_row, read_rows, write_block, write_rows
 from benchmarks.recommendation import DEEPEST, FEED, Truth, drawn_cut
 from benchmarks.rough import KINDS
-from benchmarks.rough_machines import ROUGH, RoughMachine, rough_machine
+from benchmarks.rough_machines import ROUGH, rough_machine
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.io.results.identifications import machine_from_json
 from rcsa_ident.io.results.parts import read_result
+from rcsa_ident.io.settings.machines import MachineFile
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.cut import CutSpec
+from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
 from rcsa_ident.workflows.advise import advise
@@ -36,23 +39,23 @@ from rcsa_ident.workflows.tool_change import ToolChange
 CUTS, AGAIN = 5, 2000
 
 
-def case(machine: RoughMachine, answer: TipSource, name: str, rng: np.random.Generator) -> dict[str, Any]:
+def case(
+    answer: TipSource, drawn: Tooling, told: CuttingCoefficients, setup: MachineFile, tooling: Tooling, rng: np.random.Generator
+) -> dict[str, Any]:
     """Return what is recommended for a random cut of a tooling, and what is true of it.
 
-    `answer`: what was identified of it
-    `name`: of the tooling
+    `answer`: what was identified of the machine
+    `drawn`, `told`: the tooling as drawn, and the coefficients that are told
+    `setup`, `tooling`: machine and tooling as they are
     `rng`: draws the cut
     """
     engagement, feed_angle, speeds = drawn_cut(rng)
-    told = machine.told.workpiece.coefficients
     cut = CutSpec(engagement, feed_angle, FEED, None, {"tangential": told.tangential, "radial_ratio": told.radial_ratio})
-    advice = advise(ToolChange(answer, machine.toolings[name], cut, speeds, DEEPEST))
-    setup, tooling = machine.true[name]
+    advice = advise(ToolChange(answer, drawn, cut, speeds, DEEPEST))
     dynamics = poles(reduced(rotor(setup.spindle, tooling.assembly)), 0.5 * float(speeds[0] + speeds[-1]))
     truth = Truth(dynamics, tooling, CuttingConditions(1.0, 1.0, FEED, engagement, feed_angle), setup.workpiece.coefficients)
     deep = [point for point in advice.recommended if np.isfinite(point.depth)]
     return {
-        "tooling": name,
         "recommended": truth.of(deep[0]) if deep else None,
         "dominates": str(advice.band),
     }
@@ -103,7 +106,8 @@ def main(arguments: Sequence[str]) -> None:
             for k in range(given.cuts):
                 if (seed, name, k) in known:
                     continue
-                row = {"machine": seed, "cut": k} | case(machine, answer, name, np.random.default_rng([seed, place, k]))
+                told, rng = machine.told.workpiece.coefficients, np.random.default_rng([seed, place, k])
+                row = {"machine": seed, "cut": k, "tooling": name} | case(answer, machine.toolings[name], told, *machine.true[name], rng)
                 known[seed, name, k] = row
                 append_row(path, row)
                 print(json.dumps(row), flush=True)

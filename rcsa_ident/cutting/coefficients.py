@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from rcsa_ident.base.errors import InputError
@@ -19,6 +20,8 @@ _RANGES = {
     "radial_edge": ("radial_edge", EDGE),
     "axial_edge": ("axial_edge", EDGE),
 }
+#: Chip at which a curved law has the K_tc of its straight line [m]; standard deviations from which on a part of it is told.
+REFERENCE_CHIP, _TOLD = 5e-5, 2.0
 _SPREADS = ("tangential_spread", "ratio_spread", "edge_spread")
 
 
@@ -100,3 +103,63 @@ class CuttingCoefficients(Shown):
         edges = {"te": self.tangential_edge, "re": self.radial_edge, "ae": self.axial_edge}
         parts = [f"K_tc {1e-6 * self.tangential:.4g} MPa", *(f"k_{name} {value:.3g}" for name, value in ratios.items() if value)]
         return ", ".join([*parts, *(f"K_{name} {1e-3 * value:.3g} N/mm" for name, value in edges.items() if value)])
+
+
+@dataclass(frozen=True, slots=True)
+class ForceLaw:
+    """What factors on the force in the orders of the teeth say of it, with standard deviations.
+
+    `exponent` [-]: K_tc follows the chip thickness h as (h / `REFERENCE_CHIP`)^exponent
+    `tangential_edge`, `radial_edge` [N/m]: what is to be added to K_te and K_re
+    `entry` [rad]: by which teeth enter later, for each kind of cut; none where the entry is at 0 or unknown
+    `explained` [-]: share of the squares of all factors that these explain
+    `feed` [m]: per tooth, of the cuts
+    """
+
+    exponent: tuple[float, float]
+    tangential_edge: tuple[float, float]
+    radial_edge: tuple[float, float]
+    entry: Mapping[int, tuple[float, float]]
+    explained: float
+    feed: float
+
+    def line(self, told: CuttingCoefficients, feed: float | None) -> CuttingCoefficients:
+        """Return the straight line that stands for this law at a feed per tooth [m].
+
+        At the feed of the cuts the told line keeps its slope, and K_tc follows other feeds with the exponent, which adds its doubt. Edge
+        forces change where no exponent is told: over one feed the two imitate each other. Without a feed, and where nothing lies beyond
+        twice its deviation, it is the told line.
+        """
+        if _beyond(self.exponent):
+            further = 0.0 if feed is None else math.log(feed / self.feed)
+            spread = min(math.hypot(told.tangential_spread, self.exponent[1] * further), 1.0)
+            factor = math.exp(self.exponent[0] * further)
+            return replace(told, tangential=told.tangential * factor, tangential_spread=spread)
+        more = {"tangential_edge": self.tangential_edge, "radial_edge": self.radial_edge}
+        edges = {name: max(getattr(told, name) + value[0], 0.0) for name, value in more.items() if _beyond(value)}
+        return replace(told, **edges)
+
+    @property
+    def words(self) -> str:
+        """In a sentence: what lies beyond twice its deviation; empty where nothing does."""
+        told = []
+        if _beyond(self.exponent):
+            told.append(f"the cutting coefficients follow the chip thickness with the exponent {_with_deviation(self.exponent)}")
+        for name, (value, std) in (("K_te", self.tangential_edge), ("K_re", self.radial_edge)):
+            if _beyond((value, std)):
+                told.append(f"{name} differs by {_with_deviation((1e-3 * value, 1e-3 * std))} N/mm")
+        for kind, (value, std) in self.entry.items():
+            if _beyond((value, std)):
+                of = f" in cuts of kind {kind + 1}" if len(self.entry) > 1 else ""
+                told.append(f"teeth enter{of} by {_with_deviation((math.degrees(value), math.degrees(std)))} degrees later")
+        if not told:
+            return ""
+        return f"{'; '.join(told)} (± one standard deviation): this explains {100.0 * self.explained:.0f} % of the differences"
+
+
+def _beyond(known: tuple[float, float]) -> bool:
+    return abs(known[0]) > _TOLD * known[1]
+
+
+def _with_deviation(known: tuple[float, float]) -> str:
+    return f"{known[0]:.2g} ± {known[1]:.1g}"

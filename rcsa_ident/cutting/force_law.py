@@ -11,60 +11,24 @@ later.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.coefficients import REFERENCE_CHIP, CuttingCoefficients, ForceLaw
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import tooth_force, unit_lines, unit_values
 from rcsa_ident.cutting.rows import rows_of
 
-#: Chip at which K_tc is that of the straight line [m].
-REFERENCE_CHIP = 5e-5
 #: Spreads of the unknowns before anything was measured: logarithms of K_tc and k_rc, the exponent, edge forces over K_tc [m], entry [rad].
 _TANGENTIAL, _RATIO, _EXPONENT, _EDGE, _ENTRY = 0.1, 0.1, 0.3, 2e-5, float(np.radians(3.0))
 #: What a factor may be wrong by beside its own deviation [-].
 _FLOOR = 3e-3
-#: Standard deviations from which on an unknown is told.
-_TOLD = 2.0
 #: Step of the entry angle [rad], and nodes along an arc: h log h is no polynomial where a chip begins at 0.
 _STEP, _NODES = 1e-4, 200
-
-
-@dataclass(frozen=True, slots=True)
-class ForceLaw:
-    """What factors on the force in the orders of the teeth say of it, with standard deviations.
-
-    `exponent` [-]: K_tc follows the chip thickness h as (h / `REFERENCE_CHIP`)^exponent
-    `tangential_edge`, `radial_edge` [N/m]: what is to be added to K_te and K_re
-    `entry` [rad]: by which teeth enter later, for each kind of cut; none where the entry is at 0 or unknown
-    `explained` [-]: share of the squares of all factors that these explain
-    """
-
-    exponent: tuple[float, float]
-    tangential_edge: tuple[float, float]
-    radial_edge: tuple[float, float]
-    entry: Mapping[int, tuple[float, float]]
-    explained: float
-
-    @property
-    def words(self) -> str:
-        """In a sentence: what lies beyond twice its deviation; empty where nothing does."""
-        told = []
-        if _beyond(self.exponent):
-            told.append(f"the cutting coefficients follow the chip thickness with the exponent {_with_deviation(self.exponent)}")
-        for name, (value, std) in (("K_te", self.tangential_edge), ("K_re", self.radial_edge)):
-            if _beyond((value, std)):
-                told.append(f"{name} differs by {_with_deviation((1e-3 * value, 1e-3 * std))} N/mm")
-        for kind, (value, std) in self.entry.items():
-            if _beyond((value, std)):
-                of = f" in cuts of kind {kind + 1}" if len(self.entry) > 1 else ""
-                told.append(f"teeth enter{of} by {_with_deviation((float(np.degrees(value)), float(np.degrees(std))))} degrees later")
-        return f"{'; '.join(told)}: this explains {100.0 * self.explained:.0f} % of the differences" if told else ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,14 +44,6 @@ class KnownFactors:
     log: ComplexArray
     deviation: FloatArray
     change: ComplexArray
-
-
-def _beyond(known: tuple[float, float]) -> bool:
-    return abs(known[0]) > _TOLD * known[1]
-
-
-def _with_deviation(known: tuple[float, float]) -> str:
-    return f"{known[0]:.2g} ± {known[1]:.1g}"
 
 
 def law_changes(cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray) -> ComplexArray:
@@ -137,11 +93,12 @@ def _of_the_exponent(cutter: Cutter, conditions: CuttingConditions, coefficients
     return lines @ conditions.machine_from_feed.T if conditions.feed_angle else lines
 
 
-def fit_law(known: Sequence[KnownFactors], coefficients: CuttingCoefficients) -> ForceLaw:
+def fit_law(known: Sequence[KnownFactors], coefficients: CuttingCoefficients, feed: float) -> ForceLaw:
     """Return what factors on the force say of its law.
 
     `known`: those of each kind of cut; kinds have an entry each, all else in common
     `coefficients`: of the straight line that was simulated
+    `feed` [m]: per tooth, for which it was
     """
     entries = sorted({each.kind for each in known if np.any(each.change[:, 5])})
     spread = np.array([_TANGENTIAL, _RATIO, _EXPONENT, _EDGE, _EDGE, *([_ENTRY] * len(entries))])
@@ -165,4 +122,4 @@ def fit_law(known: Sequence[KnownFactors], coefficients: CuttingCoefficients) ->
     pairs = list(zip(found.tolist(), deviation.tolist(), strict=True))
     edges = [(coefficients.tangential * value, coefficients.tangential * std) for value, std in pairs[3:5]]
     explained = 1.0 - rest / max(float(np.sum(b**2)), 1e-300)
-    return ForceLaw(pairs[2], edges[0], edges[1], dict(zip(entries, pairs[5:], strict=True)), max(explained, 0.0))
+    return ForceLaw(pairs[2], edges[0], edges[1], dict(zip(entries, pairs[5:], strict=True)), max(explained, 0.0), feed)

@@ -12,6 +12,7 @@ twice the logarithm of how much likelier the lines are with the cause than witho
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -29,6 +30,7 @@ from rcsa_ident.identification.further_unknowns import (
     Warming,
     loudness,
     order_factors,
+    still_felt,
     warmth,
 )
 from rcsa_ident.identification.levenberg_marquardt import Solution
@@ -42,8 +44,8 @@ _STEPS, _NOISES = 60, 3
 BELIEVED = 25.0
 #: Odds that a cause acts before anything was measured.
 ODDS = 0.1
-#: Time constants of the warmth that is asked for [s].
-_CONSTANTS = (450.0, 900.0, 1800.0)
+#: Time constants of the warmth that is asked for [s], and whether the spindle turned before.
+_COURSES = tuple(itertools.product((450.0, 900.0, 1800.0), (False, True)))
 #: Spreads: of a natural frequency from the first to the last cut and over the speeds, of a cut's scale, of the force in an order of the
 #: teeth, of a clamping's joint stiffness; and of where the flange's sensor looks [m].
 _DRIFT, _SCALE, _ORDER, _CLAMPING, _DISTANCE = 0.015, 0.03, 0.05, 0.06, 20e-3
@@ -158,8 +160,8 @@ def further_unknowns(found: Explanation, data: IdentificationData) -> Further | 
             more = Warming(ids, None)
         case Cause.TIME:
             # the first way is an even course, and a thermometer shows any better
-            constant = _CONSTANTS[max(found.way - 1, 0)] if found.way else _CONSTANTS[1]
-            more = Warming(ids, None if _followed(data) else constant)
+            constant, warmed_up = _COURSES[found.way - 1] if found.way else (900.0, False)
+            more = Warming(ids, None) if _followed(data) else Warming(ids, constant, warmed_up=warmed_up)
         case _:
             return None
     return None if any(isinstance(each, type(more)) for each in data.further) else more
@@ -213,7 +215,7 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
     orders = [[[(i, t * each, m) for t, m in zip(tooling[i].tolist(), order[i].tolist(), strict=True)] for i in axes] for each in (0, 1)]
     cuts = [[(k,) for k in own.tolist()] for own in cut]
     found = {
-        Cause.TIME: [drift(course) for course in _courses(data)],
+        Cause.TIME: [_beside(*(drift(course) for course in way)) for way in _courses(data)],
         # the model follows a straight line, as well as its prior lets it
         Cause.SPEED: [drift(misfit.relative_speed), drift(1.5 * misfit.relative_speed**2 - 0.5)],
         Cause.ORDER: [by_key(keys, [(_ORDER * real, _ORDER * turned) for real, turned in model]) for keys in orders],
@@ -232,14 +234,16 @@ def _columns(solution: Solution, misfit: Misfit) -> dict[Cause, list[list[FloatA
     return {cause: ways for cause, ways in asked.items() if ways}
 
 
-def _courses(data: IdentificationData) -> list[FloatArray]:
-    """Ways in which the machine may change with time: evenly, and as heat of friction that it takes up, shape (k,) each.
+def _courses(data: IdentificationData) -> list[list[FloatArray]]:
+    """Ways in which the machine may change with time: evenly, and as heat of friction that it takes up; courses of shape (k,) for each.
 
-    Of a machine whose temperature is known that heat is no course of its own.
+    Of a machine that had turned before, what it had taken up is a course of its own. Of one whose temperature is known that heat is none.
     """
-    if _followed(data):
-        return [_spread_out(data.made.started)]
-    return [_spread_out(each) for each in (data.made.started, *(warmth(data, constant) for constant in _CONSTANTS))]
+    ways = [[data.made.started]]
+    for constant, warmed_up in () if _followed(data) else _COURSES:
+        before = still_felt(data, constant).T if warmed_up else ()
+        ways.append([warmth(data, constant, warmed_up=warmed_up), *before])
+    return [[_spread_out(course) for course in way] for way in ways]
 
 
 def _followed(data: IdentificationData) -> bool:
@@ -253,6 +257,11 @@ def _spread_out(course: FloatArray) -> FloatArray:
     if not high > low:
         return np.zeros(course.size)
     return 2.0 * (course - low) / (high - low) - 1.0
+
+
+def _beside(*ways: Sequence[FloatArray]) -> list[FloatArray]:
+    """Columns of several ways on each axis."""
+    return [np.hstack(rows) for rows in zip(*ways, strict=True)]
 
 
 def _side_by_side(own: Sequence[FloatArray]) -> list[FloatArray]:

@@ -211,7 +211,7 @@ def learned(found: LearnedChanges) -> list[Remark]:
     told = []
     if found.warming is not None:
         cause = Cause.TIME if found.warming.thermometer is None else Cause.TEMPERATURE
-        told.append((cause, f"{found.warming.words}: the answer is the warm machine"))
+        told.append((cause, f"{found.warming.words}: the answer is the {found.warming.state}"))
     if found.orders:
         off = 100.0 * float(np.sqrt(np.mean([abs(each.log) ** 2 for each in found.orders.values()])))
         words = (

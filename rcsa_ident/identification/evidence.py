@@ -122,9 +122,9 @@ class EvidenceSelection:
             if whole is not data:
                 assert isinstance(found, PlaneFit | CoupledFit)
                 found = replace(found, whole=whole)
-            if isinstance(found, PlaneFit) and not data.sweeps and not data.tests and data.rough is None:
+            if isinstance(found, PlaneFit) and not data.sweeps and not data.tests:
                 first, found = found, self._freed(found, whole, sequence, map, trace, progress)
-                if found.data.further or first.deferred:
+                if data.rough is None and (found.data.further or first.deferred):
                     found = self._asked_of_the_rest(first, found, map, _report_to(BOTH, trace, progress))
             return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
@@ -173,7 +173,10 @@ class EvidenceSelection:
                 return found
             refused.add(further[0])
             try:
-                other = self._with(further[1], whole, sequence, map, trace, progress)
+                # of rough drawings from the answer on, at toolings that are near to the true ones: several searches have led to it
+                start = self.start if whole.rough is None else found.answer(0, self.name).machine.starts()
+                at_answer = whole if whole.rough is None else whole.with_toolings_at(found.rough_values)
+                other = replace(self, start=start)._with(further[1], at_answer, sequence, map, trace, progress)
             except (ArithmeticError, np.linalg.LinAlgError):
                 continue
             if other is not None and other.evidence < found.evidence - BELIEVED:

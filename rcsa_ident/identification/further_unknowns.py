@@ -14,10 +14,13 @@ from rcsa_ident.identification.made_cuts import USUAL_PAUSE
 
 #: Spreads: of the force in an order of the teeth, of a cut's scale, of a clamping's joint stiffness, and of that with the cuts' loudness.
 ORDER, SCALE, GRIP, GIVING_WAY = 0.1, 0.03, 0.08, 0.025
-#: Exponent of the speed in the heat of friction; spreads of that, of the time constant's logarithm, and of a cut's warmth about its course.
-FRICTION, FRICTION_SPREAD, TIME_SPREAD, OFF_COURSE = 1.25, 0.2, float(np.log(2.0)), 0.04
+#: Exponent of the speed in the heat of friction; spreads of that, of the time constant's logarithm, of the warmth at the first cut after
+#: a long pause, and of a cut's warmth about its course.
+FRICTION, FRICTION_SPREAD, TIME_SPREAD, START, OFF_COURSE = 1.25, 0.2, float(np.log(2.0)), 0.4, 0.04
 #: For which the spindle turns on at most where the next cut comes later [s].
 LONGEST_TURNING = 2.0 * USUAL_PAUSE
+#: A pause in which nobody knows what the spindle did [s].
+LONG_PAUSE = 600.0
 #: Steps of its unknowns within which a course is a straight line; and that of their differences.
 NEAR, _STEP = 0.3, 1e-4
 
@@ -110,22 +113,25 @@ def loudness(data: IdentificationData) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Warming:
-    """A stiffness that changes as the machine warms up: by a thermometer, or by the heat of friction since the first cut.
+    """A stiffness that changes as the machine warms up: by a thermometer, or by the heat of friction of the cuts.
 
     `cut_ids`: which have a deviation of their own
     `time_constant` [s]: with which the machine takes up the heat of friction; None where a thermometer tells how warm it is
     `exponent` [-]: of the speed in that heat
+    `warmed_up`: whether the spindle is thought to have turned before the first cut and in long pauses
     """
 
     cut_ids: tuple[str, ...]
     time_constant: float | None
     exponent: float = FRICTION
+    warmed_up: bool = False
 
     def on(self, data: IdentificationData) -> IdentificationData:
         """Return the same data with the warmth of each cut in the model.
 
-        What is not known of it are further unknowns: the clock's time constant and exponent, and a deviation of each cut. The answer is for
-        the warm machine: as warm as it becomes at each speed, or as the highest temperature that was told.
+        What is not known of it are further unknowns: the clock's time constant and exponent, how warm the machine was at the first cut
+        and after each long pause, and a deviation of each cut. The answer is for the warm machine: as warm as it becomes at each speed,
+        as it was in the cuts on average where it had turned before, or as the highest temperature that was told.
         """
         own = OFF_COURSE * np.equal.outer(np.array(data.cut_ids[: data.cuts]), np.array(self.cut_ids)).astype(float)
         learned, steady = ~data.made.judged, 0.0
@@ -139,12 +145,16 @@ class Warming:
             steady = self.exponent * share**self.exponent * half / speed
 
             def colder(constant: float, exponent: float) -> FloatArray:
-                return warmth(data, constant, exponent) - share**exponent
+                return warmth(data, constant, exponent, self.warmed_up) - share**exponent
 
             middle = colder(self.time_constant, self.exponent)
             slower = TIME_SPREAD * (colder(self.time_constant * np.exp(_STEP), self.exponent) - middle) / _STEP
             steeper = FRICTION_SPREAD * (colder(self.time_constant, self.exponent + _STEP) - middle) / _STEP
-            ways = np.column_stack([slower, steeper, own])
+            common = np.column_stack([slower, steeper, START * still_felt(data, self.time_constant)])
+            if self.warmed_up:
+                # how warm it would become nobody has seen
+                middle, common = middle - middle[learned].mean(), common - common[learned].mean(axis=0)
+            ways = np.hstack([common, own])
         more, first = data.with_unknowns((1.0,) * ways.shape[1], None), len(data.coefficient_spread)
         return replace(more, warmth=middle, course=ways, course_first=first, steady=steady, further=(*data.further, self))
 
@@ -156,21 +166,49 @@ class Warming:
         return replace(self, time_constant=constant, exponent=max(self.exponent + FRICTION_SPREAD * float(values[1]), 0.0))
 
 
-def warmth(data: IdentificationData, time_constant: float, exponent: float = FRICTION) -> FloatArray:
+def warmth(data: IdentificationData, time_constant: float, exponent: float = FRICTION, warmed_up: bool = False) -> FloatArray:
     """Return how warm the machine was at each cut, over what it comes to at the highest speed of those that are learned from, shape (k,).
 
-    T' = (n^p - T) / tau from the cold machine on, with the cut's speed n while it is made and for a usual pause behind it, then none.
+    T' = (n^p - T) / tau with the cut's speed n while it is made and for a usual pause behind it, then none.
+
+    `warmed_up`: before the first cut and in long pauses the spindle turned as in the cuts; by default the machine is cold, and stood
     """
+    order, started, first = _sessions(data)
+    heat = (data.spindle_speed[: data.cuts][order] / max(sum(data.speed_range), 1e-300)) ** exponent
+    before = np.where(first, heat.mean(), np.nan) if warmed_up else np.full(heat.size, np.nan)
+    found = np.empty(heat.size)
+    found[order] = _taken_up(heat, started, time_constant, before)
+    return found
+
+
+def still_felt(data: IdentificationData, time_constant: float) -> FloatArray:
+    """Return what is left at each cut of the warmth before its session, as a share, shape (k, sessions)."""
+    order, started, first = _sessions(data)
+    found = np.zeros((order.size, int(first.sum())))
+    for session, place in enumerate(np.flatnonzero(first)):
+        before = np.where(first, 0.0, np.nan)
+        before[place] = 1.0
+        found[order, session] = _taken_up(np.zeros(order.size), started, time_constant, before)
+    return found
+
+
+def _sessions(data: IdentificationData) -> tuple[np.ndarray, FloatArray, np.ndarray]:
+    """Places of the cuts in the order in which they were made, when that was [s], and which came first or after a long pause."""
     order = np.argsort(data.made.started, kind="stable")
-    started, speed = data.made.started[order], data.spindle_speed[: data.cuts][order]
-    heat = (speed / max(sum(data.speed_range), 1e-300)) ** exponent
+    started = data.made.started[order]
+    return order, started, np.diff(started, prepend=-np.inf) > LONG_PAUSE
+
+
+def _taken_up(heat: FloatArray, started: FloatArray, time_constant: float, before: FloatArray) -> FloatArray:
+    """Warmth at cuts in their order; `before`: warmth before a cut, NaN where it is what the one before has left."""
     found, now = np.empty(heat.size), 0.0
     for k, pause in enumerate(np.diff(started, append=started[-1:] + USUAL_PAUSE)):
+        now = now if np.isnan(before[k]) else before[k]
         # half of the cut lies behind its recording's middle
         turning = min(float(pause), LONGEST_TURNING)
         kept = np.exp(-0.5 * turning / time_constant)
-        found[order[k]] = now * kept + heat[k] * (1.0 - kept)
-        now = (found[order[k]] * kept + heat[k] * (1.0 - kept)) * np.exp((turning - pause) / time_constant)
+        found[k] = now * kept + heat[k] * (1.0 - kept)
+        now = (found[k] * kept + heat[k] * (1.0 - kept)) * np.exp((turning - pause) / time_constant)
     return found
 
 

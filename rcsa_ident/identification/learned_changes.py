@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rcsa_ident.cutting.force_law import ForceLaw
+from rcsa_ident.cutting.coefficients import ForceLaw
 from rcsa_ident.dynamics.coordinates import Dof
 
 
@@ -18,6 +18,7 @@ class LearnedWarming:
     `frequency`, `deviation` [-]: relative change of the mode that changes most, and its standard deviation
     `time_constant` [s], `exponent` [-]: of the heat of friction; None where a thermometer is followed
     `coldest`, `warmest` [°C]: that the thermometer showed; None without one
+    `warmed_up`: whether the spindle had turned before the cuts: how warm it would become at last nobody has seen
     """
 
     frequency: float
@@ -26,6 +27,12 @@ class LearnedWarming:
     exponent: float | None = None
     coldest: float | None = None
     warmest: float | None = None
+    warmed_up: bool = False
+
+    @property
+    def state(self) -> str:
+        """For which state of the machine the answer holds."""
+        return "machine as warm as in its cuts" if self.warmed_up else "warm machine"
 
     @property
     def thermometer(self) -> tuple[float, float] | None:

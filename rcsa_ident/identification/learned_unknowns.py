@@ -79,4 +79,5 @@ def _warming(data: IdentificationData, solution: Solution, each: Warming, values
         told = data.made.temperature[~data.made.judged]
         return LearnedWarming(warmer * change, warmer * deviation, coldest=float(told.min()), warmest=float(told.max()))
     constant = each.time_constant * float(np.exp(TIME_SPREAD * values[0]))
-    return LearnedWarming(warmer * change, warmer * deviation, constant, each.exponent + FRICTION_SPREAD * float(values[1]))
+    exponent = each.exponent + FRICTION_SPREAD * float(values[1])
+    return LearnedWarming(warmer * change, warmer * deviation, constant, exponent, warmed_up=each.warmed_up)

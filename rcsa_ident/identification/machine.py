@@ -274,7 +274,7 @@ class IdentifiedMachine(Machine):
         """Return for which state it answers, as ``warm machine, 14000 rev/min``; empty where it has one state alone."""
         if self.warming is None:
             return super().state(speed)
-        parts = ["warm machine" if self.temperature is None else f"at {self.temperature:g} °C", super().state(speed)]
+        parts = [self.warming.state if self.temperature is None else f"at {self.temperature:g} °C", super().state(speed)]
         return ", ".join(part for part in parts if part)
 
     def speed_answered(self, speed: float | None = None) -> float | None:

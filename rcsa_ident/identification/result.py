@@ -13,6 +13,7 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark, RemarkCode, says
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.cutting.coefficients import ForceLaw
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
@@ -219,7 +220,9 @@ class Identification(Shown):
             self.band,
             status=self.status,
             reasons=self.reasons,
-            identified_workpiece=workpiece_after(self.workpiece, {c.term: v for c, v in self.coefficients.items() if not c.tooling}),
+            identified_workpiece=workpiece_after(
+                self.workpiece, {c.term: v for c, v in self.coefficients.items() if not c.tooling}, self.changes.law
+            ),
             sensors=self.sensors,
             name=self.campaign,
             whole=self.whole,
@@ -234,17 +237,20 @@ class Identification(Shown):
         return in_words(str(self.status), len(self.cut_ids), modes, self.reasons, tests)
 
 
-def workpiece_after(told: Workpiece | None, found: Mapping[ForceTerm, tuple[float, float]]) -> Workpiece | None:
+def workpiece_after(
+    told: Workpiece | None, found: Mapping[ForceTerm, tuple[float, float]], law: ForceLaw | None = None
+) -> Workpiece | None:
     """Return a campaign's workpiece whose coefficients are as well known as its cuts have left them.
 
     `found`: mapping of ForceTerm to (float, float) [-]; logarithms of the factors on what was told, and their standard deviations; what is
         not there is known as told
+    `law`: of the force, as factors on it have shown it
     """
     if told is None:
         return None
     known = told.coefficients
     asked = ((ForceTerm.TANGENTIAL, known.tangential_spread), (ForceTerm.RATIO, known.ratio_spread))
-    return replace(told, coefficients=known.after(*(found.get(term, (0.0, spread)) for term, spread in asked)))
+    return replace(told, coefficients=known.after(*(found.get(term, (0.0, spread)) for term, spread in asked)), law=law)
 
 
 def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence[str], tests: int = 0) -> str:

@@ -81,6 +81,20 @@ class Signals(list[Channel]):
         self.started = started
 
 
+def moment_of(text: str, form: str) -> datetime | None:
+    """Return the date and time of a text of that form, as `datetime.strptime` takes it; None where it holds none.
+
+    Examples
+    --------
+    >>> print(moment_of("18-Apr-16 13:49:58", "%d-%b-%y %H:%M:%S"))
+    2016-04-18 13:49:58
+    """
+    try:
+        return datetime.strptime(text, form)
+    except ValueError:
+        return None
+
+
 def started_of(channels: Sequence[Channel]) -> datetime | None:
     """Return when a recording's first sample was taken, where its file says it."""
     return channels.started if isinstance(channels, Signals) else None

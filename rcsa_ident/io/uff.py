@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.io.channels import moment_of
 from rcsa_ident.io.files import MEGABYTE, read_bytes, replacing
 
 LARGEST_UFF = 512 * MEGABYTE
@@ -54,6 +56,7 @@ class UffFunction:
     `names`: what the file calls the function, the most particular first: response entity, label of the ordinate, title, place as ``3:-X``
     `step`: of an even abscissa, as the header rounds it to six digits; 0 where the abscissa stands in the file point by point
     `system`: whether the file states its system of units (dataset 164)
+    `moment`: its date and time, None where the file has none
     """
 
     kind: int
@@ -70,6 +73,7 @@ class UffFunction:
     names: tuple[str, ...] = ()
     step: float = 0.0
     system: bool = False
+    moment: datetime | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "abscissa", frozen(self.abscissa))
@@ -148,9 +152,7 @@ class _Lines:
 
 def _function(lines: _Lines, binary: bool, head: Sequence[bytes], system: tuple[float, float] | None) -> UffFunction:
     where = lines.here
-    title = lines.text().strip()
-    for _ in range(4):
-        lines.text()
+    title, *more = (lines.text().strip() for _ in range(5))
     dof = lines.text()
     kind = _whole(dof[:5], "function type", lines)
     response = _whole(dof[41:51], "response node", lines), _whole(dof[51:55], "response direction", lines)
@@ -192,6 +194,7 @@ def _function(lines: _Lines, binary: bool, head: Sequence[bytes], system: tuple[
         tuple(names),
         spacing,
         system is not None,
+        next((moment for line in more if (moment := moment_of(line, "%d-%b-%y %H:%M:%S")) is not None), None),
     )
 
 

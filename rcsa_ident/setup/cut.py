@@ -15,7 +15,7 @@ from rcsa_ident.base.plausibility import AXIAL_DEPTH, FEED_ANGLE, FEED_PER_TOOTH
 from rcsa_ident.base.remarks import Remark
 from rcsa_ident.base.shown import Shown
 from rcsa_ident.base.units import to_rpm
-from rcsa_ident.cutting.coefficients import CuttingCoefficients, checked_coefficient
+from rcsa_ident.cutting.coefficients import CuttingCoefficients, ForceLaw, checked_coefficient
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
@@ -30,11 +30,17 @@ class Workpiece(Shown):
 
     `edge_force_spread` [N/m]: how large edge forces of which nothing is told may be: they are positive, and as normally distributed. It
         counts where something of the campaign's drawings is not exact, too.
+    `law`: what cuts have shown of their forces beyond these coefficients; None where they have shown nothing
     """
 
     name: str
     coefficients: CuttingCoefficients
     edge_force_spread: float = 10e3
+    law: ForceLaw | None = None
+
+    def at(self, feed: float | None) -> CuttingCoefficients:
+        """Return the coefficients at a feed per tooth [m]."""
+        return self.coefficients if self.law is None else self.law.line(self.coefficients, feed)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.coefficients}"
@@ -118,7 +124,7 @@ class CutSpec(Shown):
         if self.material is not None:
             return replace(material(self.material).coefficients, **self.coefficients)
         if workpiece is not None:
-            return replace(workpiece.coefficients, **self.coefficients)
+            return replace(workpiece.at(self.feed_per_tooth), **self.coefficients)
         for key, name in (("tangential", "tangential coefficient"), ("radial_ratio", "radial ratio")):
             if key not in self.coefficients:
                 allowed = "the tangential coefficient and the radial ratio, or a material: without a campaign no workpiece is known"

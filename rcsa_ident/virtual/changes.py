@@ -75,6 +75,10 @@ class JointChanges:
         positive("joint_changes.amplitude_um", self.amplitude, "m")
         non_negative("joint_changes.reclamping_percent", self.reclamping)
 
+    def clamping(self, seed: int, tooling: int) -> float:
+        """Return c of a tooling of a campaign."""
+        return self.reclamping * float(np.random.default_rng([seed, 78, tooling]).normal())
+
 
 @dataclass(frozen=True, slots=True)
 class ChipLaw:

@@ -58,4 +58,5 @@ def with_law(changes: LearnedChanges, campaign: Campaign, readings: Sequence[Rea
         rows = np.array([0 if axis is Dof.X else 1 for axis, _, _ in own], dtype=np.intp)
         logs, deviations = (np.array([getattr(each, name) for _, _, each in own]) for name in ("log", "deviation"))
         known.append(KnownFactors(kind, logs, deviations, change[np.arange(rows.size), rows]))
-    return replace(changes, law=fit_law(known, campaign.coefficients))
+    feeds = [cuts[id].conditions.feed_per_tooth for id in ids if id in cuts]
+    return replace(changes, law=fit_law(known, campaign.coefficients, float(np.exp(np.mean(np.log(feeds))))))

@@ -173,7 +173,7 @@ def _in_cut(setup: VirtualSetup, tooling: Tooling, turn: Turn, seed: int) -> Vir
     changes, spindle = setup.changes, setup.spindle
     if changes.joint is None:
         return changed(spindle, changes, turn, 0.0)
-    clamping = changes.joint.reclamping * float(np.random.default_rng([seed, 78, turn.tooling]).normal())
+    clamping = changes.joint.clamping(seed, turn.tooling)
     still = changed(spindle, changes, turn, clamping)
     speed = setup.plan.cuts[turn.cut][1]
     lines = rigid_force_lines(tooling.cutter, setup.plan.conditions(speed), setup.workpiece.coefficients, law=changes.chip_law)

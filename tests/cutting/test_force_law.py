@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import rcsa_ident as ri
+from rcsa_ident.cutting.coefficients import REFERENCE_CHIP, ForceLaw
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.force import force_lines
-from rcsa_ident.cutting.force_law import REFERENCE_CHIP, ForceLaw, KnownFactors, fit_law, law_changes
+from rcsa_ident.cutting.force_law import KnownFactors, fit_law, law_changes
 from rcsa_ident.cutting.profile import Profile
 from rcsa_ident.virtual.changes import ChipLaw
 from rcsa_ident.virtual.milling import rigid_force_lines
@@ -64,7 +65,7 @@ def test_slopes_are_those_of_other_forces(column, unit, moved, cut):
 def test_edges_and_a_late_entry_are_told_apart():
     other = replace(KNOWN, tangential_edge=15e3, radial_edge=9e3)
     late = replace(CUT, engagement=Engagement(DOWN.entry + np.radians(0.5), DOWN.exit))
-    found = fit_law([learned(force_lines(CUTTER, late, other, ORDERS), kind=2)], KNOWN)
+    found = fit_law([learned(force_lines(CUTTER, late, other, ORDERS), kind=2)], KNOWN, CUT.feed_per_tooth)
     assert found.tangential_edge[0] == pytest.approx(3e3, rel=0.1)
     assert found.radial_edge[0] == pytest.approx(-1e3, rel=0.15)
     assert np.degrees(found.entry[2][0]) == pytest.approx(0.5, rel=0.1)
@@ -76,7 +77,7 @@ def test_edges_and_a_late_entry_are_told_apart():
 
 def test_a_curved_law_is_named():
     bent = rigid_force_lines(CUTTER, CUT, KNOWN, slices=64, samples=8192, law=ChipLaw(-0.05, REFERENCE_CHIP))[ORDERS, :2]
-    found = fit_law([learned(bent)], KNOWN)
+    found = fit_law([learned(bent)], KNOWN, CUT.feed_per_tooth)
     assert found.exponent[0] == pytest.approx(-0.05, rel=0.15)
     assert abs(found.entry[0][0]) < np.radians(0.05)
     assert found.words.startswith("the cutting coefficients follow the chip thickness with the exponent -0.0")
@@ -85,9 +86,34 @@ def test_a_curved_law_is_named():
 def test_what_no_law_explains_widens_its_deviations():
     rng = np.random.default_rng(4)
     scatter = force_lines(CUTTER, CUT, KNOWN, ORDERS) * np.exp(0.05 * rng.standard_normal((ORDERS.size, 2)))
-    near, far = (fit_law([learned(scatter, deviation=each)], KNOWN) for each in (0.05, 1e-3))
+    near, far = (fit_law([learned(scatter, deviation=each)], KNOWN, CUT.feed_per_tooth) for each in (0.05, 1e-3))
     assert far.explained < 0.8
     assert far.exponent[1] > 0.5 * near.exponent[1]
+
+
+@pytest.mark.parametrize("feed", [0.04e-3, 0.25e-3])
+def test_the_line_at_another_feed_has_the_slope_of_the_curve(feed):
+    """Least squares lines of K h (h / h_0)^e, each from a tenth of its feed to the feed: the one of the cuts is told."""
+
+    def slope(fed: float) -> float:
+        chip = np.linspace(0.1 * fed, fed, 200)
+        return float(np.polyfit(chip, chip * (chip / REFERENCE_CHIP) ** -0.2, 1)[0])
+
+    law = ForceLaw((-0.2, 0.02), (-2e3, 1e2), (0.0, 1.0), {}, 0.9, 0.1e-3)
+    told = replace(KNOWN, tangential=slope(0.1e-3) * 700e6, tangential_spread=0.03)
+    found = law.line(told, feed)
+    assert found.tangential == pytest.approx(slope(feed) * 700e6, rel=1e-9)
+    assert found.tangential_spread == pytest.approx(np.hypot(0.03, 0.02 * np.log(feed / 0.1e-3)))
+    assert found.tangential_edge == KNOWN.tangential_edge
+    assert law.line(told, 0.1e-3) == told
+    assert law.line(told, None) == told
+
+
+def test_edges_without_an_exponent_are_added():
+    law = ForceLaw((-0.01, 0.02), (3e3, 1e3), (-20e3, 1e3), {}, 0.9, 0.1e-3)
+    assert law.line(KNOWN, 0.2e-3) == replace(KNOWN, tangential_edge=15e3, radial_edge=0.0)
+    nothing = replace(law, tangential_edge=(3e3, 2e3), radial_edge=(0.0, 1.0))
+    assert nothing.line(KNOWN, 0.2e-3) == KNOWN
 
 
 def test_teeth_that_enter_at_0_have_no_entry():
@@ -96,4 +122,4 @@ def test_teeth_that_enter_at_0_have_no_entry():
 
 
 def test_nothing_beyond_its_deviation_is_told():
-    assert ForceLaw((0.1, 0.1), (1e3, 1e3), (0.0, 1.0), {0: (0.01, 0.01)}, 0.5).words == ""
+    assert ForceLaw((0.1, 0.1), (1e3, 1e3), (0.0, 1.0), {0: (0.01, 0.01)}, 0.5, 0.1e-3).words == ""

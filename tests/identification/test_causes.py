@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcsa_ident.identification.causes import BELIEVED, Cause, causes
+from rcsa_ident.identification.causes import BELIEVED, Cause, causes, further_unknowns
+from rcsa_ident.identification.further_unknowns import Warming
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.priors import Priors
@@ -102,11 +103,11 @@ def test_the_cause_is_named_first(few, cause):
     assert told.without < 1e-3
 
 
-def heated(data):
-    """Warmth of bearings whose housing warms up, too, as each cut begins; the heat is that of its speed."""
-    step, warmth = 1.0, np.zeros(len(data.cut_ids))
-    bearing = housing = 0.0
-    for k, speed in enumerate(data.spindle_speed / data.spindle_speed.max()):
+def heated(speeds, before=0.0):
+    """Warmth of bearings whose housing warms up, too, as each cut begins; the heat is that of its speed, and some is there before."""
+    step, warmth = 1.0, np.zeros(speeds.size)
+    bearing, housing = before, 0.2 * before
+    for k, speed in enumerate(speeds / speeds.max()):
         for _ in range(90):
             flow = bearing - housing
             bearing, housing = bearing + step / 900.0 * (speed**1.4 - flow), housing + step / 5400.0 * (flow - 4.0 * housing)
@@ -129,10 +130,25 @@ def test_heat_of_friction_is_told_from_what_else_changes(few):
     data = shuffled(few)
     order = np.argsort(data.made.started)
     course = np.empty(order.size)
-    course[order] = heated(replace(few, spindle_speed=few.spindle_speed[order]))
+    course[order] = heated(few.spindle_speed[order])
     told = asked(made(data, moving(course)))[2]
     assert told.found[0].cause is Cause.TIME
     assert told.found[0].evidence > BELIEVED
+
+
+def test_a_spindle_may_have_turned_before(few):
+    """A long pause in which nobody knows what the spindle did: the machine was hot at first, and nearly cold after it."""
+    data = shuffled(few)
+    order = np.argsort(data.made.started)
+    halves, course = np.array_split(order, 2), np.empty(order.size)
+    started = data.made.started + 1800.0 * np.isin(np.arange(order.size), halves[1])
+    for half, before in zip(halves, (1.3, 0.2), strict=True):
+        course[half] = heated(few.spindle_speed[half], before)
+    told = asked(made(replace(data, made=replace(data.made, started=started)), moving(course)))[2]
+    assert told.found[0].cause is Cause.TIME
+    learned = further_unknowns(told.found[0], data)
+    assert isinstance(learned, Warming)
+    assert learned.warmed_up
 
 
 def test_a_thermometer_is_asked(few):

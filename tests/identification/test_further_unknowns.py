@@ -10,6 +10,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.assemble_result import _told
 from rcsa_ident.identification.further_unknowns import (
     FRICTION,
+    LONG_PAUSE,
     LONGEST_TURNING,
     CutScales,
     GivingWay,
@@ -17,6 +18,7 @@ from rcsa_ident.identification.further_unknowns import (
     Warming,
     further_places,
     order_factors,
+    still_felt,
     warmth,
 )
 from rcsa_ident.identification.levenberg_marquardt import Solution
@@ -89,7 +91,7 @@ def test_each_has_its_places(rich):
     for each in data.further:
         other = each.on(other)
     assert len(other.coefficient_spread) == len(data.coefficient_spread)
-    assert not np.any(other.course[0, 2:])
+    assert not np.any(other.course[0, 3:])
 
 
 def after(warm, heat, time):
@@ -97,7 +99,8 @@ def after(warm, heat, time):
     return float(solve_ivp(lambda _, now: (heat - now) / 700.0, (0.0, time), [warm], rtol=1e-9, atol=1e-12).y[0, -1])
 
 
-def test_warmth_follows_its_equation(few):
+@pytest.mark.parametrize("warmed_up", [False, True])
+def test_warmth_follows_its_equation(few, warmed_up):
     rng = np.random.default_rng(8)
     count = len(few.cut_ids)
     pauses = rng.uniform(30.0, LONGEST_TURNING, count)
@@ -108,14 +111,23 @@ def test_warmth_follows_its_equation(few):
     started[course] = np.concatenate([[0.0], np.cumsum(pauses[:-1])])
     data = replace(few, made=replace(few.made, started=started))
     heat = (few.spindle_speed / few.spindle_speed.max()) ** 1.4
-    now, expected = 0.0, np.empty(count)
+    now, expected, long = 0.0, np.empty(count), True
     for k, pause in zip(course, pauses, strict=True):
-        turning = min(pause, LONGEST_TURNING)
+        if warmed_up and long:
+            now = heat.mean()
+        long, turning = pause > LONG_PAUSE, min(pause, LONGEST_TURNING)
         expected[k] = after(now, heat[k], 0.5 * turning)
         now = after(expected[k], heat[k], 0.5 * turning)
         if pause > turning:
             now = after(now, 0.0, pause - turning)
-    np.testing.assert_allclose(warmth(data, 700.0, 1.4), expected, rtol=1e-6)
+    found = warmth(data, 700.0, 1.4, warmed_up)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    # whatever the warmth before the first cut and the long pause was: the course differs by what is left of it
+    left = still_felt(data, 700.0)
+    assert left.shape == (count, 2)
+    other = found - warmth(data, 700.0, 1.4, not warmed_up)
+    np.testing.assert_allclose(left @ np.linalg.lstsq(left, other, rcond=None)[0], other, atol=1e-12)
+    assert np.abs(other).max() > 0.3
 
 
 def test_a_course_is_a_straight_line_near_another(few):
@@ -128,7 +140,7 @@ def test_a_course_is_a_straight_line_near_another(few):
     assert moved.time_constant == pytest.approx(900.0 * 2.0**0.4)
     bent = moved.on(few).warmth - told.warmth
     np.testing.assert_allclose(told.course @ values, bent, atol=0.25 * np.abs(bent).max())
-    values[2:] = 1.0
+    values[3:] = 1.0
     np.testing.assert_allclose((told.course @ values)[: told.cuts], told.course[:, :2] @ values[:2] + 0.04, atol=1e-12)
 
 

@@ -112,6 +112,8 @@ def test_beyond_its_temperatures_it_follows_a_straight_line_for_half_their_range
 def test_a_machine_without_a_thermometer_refuses_a_temperature():
     by_time = by_hand.warming_identification(changes=BY_TIME).machine
     assert by_time.state() == "warm machine"
+    warmed_up = replace(BY_TIME, warming=replace(BY_TIME.warming, warmed_up=True))
+    assert by_hand.warming_identification(changes=warmed_up).machine.state() == "machine as warm as in its cuts"
     speed_bands = replace(
         by_hand.warming_identification().machine, speed_models=(SpeedModel((800.0, 1200.0), by_hand.machine().identified),)
     )
@@ -128,7 +130,7 @@ def test_it_is_said_in_words():
     assert by_hand.CHANGES.words == (
         "natural frequencies fall by up to 5 % from cold to warm, from 22 to 38 °C",
         "the cutting coefficients follow the chip thickness with the exponent -0.08 ± 0.02; K_te differs by -1.9 ± 0.3 N/mm; teeth "
-        "enter by 0.57 ± 0.1 degrees later: this explains 79 % of the differences",
+        "enter by 0.57 ± 0.1 degrees later (± one standard deviation): this explains 79 % of the differences",
         "force in X at 4 times the spindle speed: 6 % lower than the model",
         "forces differ from cut to cut by 2 %",
         "joint stiffness of tooling T1: 4 % higher than the mean",

@@ -47,7 +47,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         # a start of six digits may be rounded by more than a sample
         if abs(apart) * rates[0] > 0.5 + _SPREAD * abs(each.abscissa[0]) * rates[0] * 2.0:
             raise InputError(f"start of channel {name}", f"{apart:.3g} s later", f"channels that start together as {names[0]}", each.where)
-    return rates[0], Signals([f.values for f in found], stored=tuple(f.ordinate.unit for f in found))
+    return rates[0], Signals([f.values for f in found], stored=tuple(f.ordinate.unit for f in found), started=found[0].moment)
 
 
 def told_channels(path: Path) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,7 +14,7 @@ import numpy as np
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.remarks import Remark
-from rcsa_ident.io.channels import LARGEST_STORED, RATE, Channel, Signals, StoredChannel, check_declared, kept, the_only
+from rcsa_ident.io.channels import LARGEST_STORED, RATE, Channel, Signals, StoredChannel, check_declared, kept, moment_of, the_only
 from rcsa_ident.io.files import Bytes, mapped
 from rcsa_ident.io.recordings.sound import cut, decoded
 from rcsa_ident.io.validated_table import listed
@@ -80,7 +81,9 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None, 
             raise InputError("recording", "a file that became shorter while it was read", COMPLETE, where)
         return _decoded(np.frombuffer(block, np.uint8).reshape(end - first, count, width)[:, place, :], encoding, order)
 
-    return float(rate), Signals([kept(StoredChannel(samples, partial(part, place))) for place in places], tuple(notes))
+    first, size = chunks.get("bext", (0, 0))
+    started = _moment(raw[first : first + size])
+    return float(rate), Signals([kept(StoredChannel(samples, partial(part, place))) for place in places], tuple(notes), started=started)
 
 
 def _chunks(raw: Bytes, where: str) -> tuple[str, dict[str, tuple[int, int]], int | None]:
@@ -157,3 +160,12 @@ def _track_names(raw: bytes, count: int) -> list[str]:
         if place.isascii() and place.isdigit() and 1 <= int(place[:9]) <= count:
             names[int(place[:9]) - 1] = (track.findtext("NAME") or "").strip()
     return names
+
+
+def _moment(broadcast: bytes) -> datetime | None:
+    """Date and time of a broadcast wave's extension, where it has them: behind its description and its two names of the originator."""
+    text = broadcast[320:338].decode("latin-1")
+    # separators are the recorder's own
+    return (
+        moment_of("".join(c if c.isdigit() else " " for c in f"{text[:10]} {text[10:]}"), "%Y %m %d %H %M %S") if len(text) == 18 else None
+    )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.cutting.force_law import ForceLaw
+from rcsa_ident.cutting.coefficients import ForceLaw
 from rcsa_ident.identification.learned_changes import LearnedChanges, LearnedFactor, LearnedWarming
 from rcsa_ident.identification.posterior import Posterior, Warmed
 from rcsa_ident.io.validated_table import Table
@@ -23,6 +23,7 @@ def changes_to_json(found: LearnedChanges) -> dict[str, Any]:
             "frequency_std_percent": 100.0 * known.deviation,
             "time_constant_min": None if known.time_constant is None else known.time_constant / 60.0,
             "speed_exponent": known.exponent,
+            "warmed_up": None if known.thermometer else known.warmed_up,
             "coldest_c": known.coldest,
             "warmest_c": known.warmest,
         }
@@ -49,7 +50,25 @@ def _law(found: ForceLaw) -> dict[str, Any]:
         "radial_edge_n_per_mm": _known(found.radial_edge, 1e-3),
         "entry_deg": [{"kind": kind + 1} | _known(each, float(np.degrees(1.0))) for kind, each in found.entry.items()],
         "explained_percent": 100.0 * found.explained,
+        "feed_per_tooth_mm": 1e3 * found.feed,
     }
+
+
+def law_of(top: Table) -> ForceLaw | None:
+    """Return the law of the force that a result has learned; None where it does not say so."""
+    table = top.table("learned", default={})
+    if "force_law" not in table:
+        return None
+    law = table.table("force_law")
+    k_te, k_re = (_pair(law.table(f"{name}_edge_n_per_mm"), 1e3) for name in ("tangential", "radial"))
+    entries = {each.number("kind", least=1, whole=True) - 1: _pair(each, float(np.radians(1.0))) for each in law.tables("entry_deg")}
+    explained = 1e-2 * law.number("explained_percent", "%", least=0.0)
+    feed = 1e-3 * law.number("feed_per_tooth_mm", "mm", above=0.0)
+    return ForceLaw(_pair(law.table("chip_exponent")), k_te, k_re, entries, explained, feed)
+
+
+def _pair(table: Table, unit: float = 1.0) -> tuple[float, float]:
+    return unit * table.number("value"), unit * table.number("std", least=0.0)
 
 
 def _known(value: tuple[float, float], unit: float = 1.0) -> dict[str, float]:
@@ -69,7 +88,8 @@ def warming_of(top: Table) -> LearnedWarming | None:
     by = known.text("by", choices=("time", "temperature"))
     shares = known.number("frequency_percent", "%") * 1e-2, known.number("frequency_std_percent", "%", least=0.0) * 1e-2
     if by == "time":
-        return LearnedWarming(*shares, known.number("time_constant_min", "min", above=0.0) * 60.0, known.number("speed_exponent"))
+        constant, warmed_up = known.number("time_constant_min", "min", above=0.0) * 60.0, known.value("warmed_up", "true or false", False)
+        return LearnedWarming(*shares, constant, known.number("speed_exponent"), warmed_up=bool(warmed_up))
     coldest, warmest = known.number("coldest_c", "°C"), known.number("warmest_c", "°C")
     if not coldest < warmest:
         known.refuse("warmest_c", f"{warmest:g}", f"above coldest_c, {coldest:g} [°C]")

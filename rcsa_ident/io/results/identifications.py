@@ -20,7 +20,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.unknowns import JOINT, ModalBlock
 from rcsa_ident.io.results.axial_flanges import axial_of
 from rcsa_ident.io.results.both_planes import both_planes_from_json, both_planes_to_json
-from rcsa_ident.io.results.changes import changes_to_json, warmed_of, warmed_to_json, warming_of
+from rcsa_ident.io.results.changes import changes_to_json, law_of, warmed_of, warmed_to_json, warming_of
 from rcsa_ident.io.results.drawings import axis_toolings_of, axis_toolings_to_json, known_toolings_of, known_toolings_to_json
 from rcsa_ident.io.results.parts import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
 from rcsa_ident.io.results.workpiece_sides import workpiece_side_of, workpiece_side_to_json
@@ -29,6 +29,7 @@ from rcsa_ident.io.settings.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.setup.campaign import Campaign
+from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.drawings import KnownToolings
 from rcsa_ident.version import __version__
@@ -220,7 +221,7 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         tuple(_speed_models(top)),
         status=Status(data["status"]),
         reasons=tuple(data["reasons"]),
-        identified_workpiece=workpiece_after(workpiece_of(top.table("workpiece")), _found(top)) if "workpiece" in top else None,
+        identified_workpiece=_workpiece(top),
         sensors=tuple(sensor_of(name, table.data, where) for name, table in top.named_tables("sensors", default={}).items()),
         name=data["campaign"]["name"],
         whole=_whole(top),
@@ -229,6 +230,10 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         axial=axial_of(top),
         warming=warming_of(top),
     )
+
+
+def _workpiece(top: Table) -> Workpiece | None:
+    return workpiece_after(workpiece_of(top.table("workpiece")), _found(top), law_of(top)) if "workpiece" in top else None
 
 
 def _found(top: Table) -> dict[ForceTerm, tuple[float, float]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -123,14 +124,14 @@ def test_channels_belong_together(tmp_path, second, words):
 
 
 @pytest.mark.parametrize(
-    ("name", "channel", "rate", "count", "first"),
+    ("name", "channel", "rate", "count", "first", "started"),
     [
-        ("time_history.uff", "1x", 20000.0, 13, -3.81956),
-        ("time_history.uff", "1x : m/s²", 20000.0, 13, -3.81956),
-        ("sample_58b_binary.uff", "Mic 01", 65536.0, 79292, -0.01475526),
+        ("time_history.uff", "1x", 20000.0, 13, -3.81956, datetime(2020, 4, 30, 19, 12, 52)),
+        ("time_history.uff", "1x : m/s²", 20000.0, 13, -3.81956, datetime(2020, 4, 30, 19, 12, 52)),
+        ("sample_58b_binary.uff", "Mic 01", 65536.0, 79292, -0.01475526, datetime(2016, 4, 18, 13, 49, 58)),
     ],
 )
-def test_files_that_others_measured(name, channel, rate, count, first):
+def test_files_that_others_measured(name, channel, rate, count, first, started):
     path = SHARED / name
     if not path.exists():
         pytest.skip(f"{name} is not beside the project")
@@ -138,6 +139,15 @@ def test_files_that_others_measured(name, channel, rate, count, first):
     assert found.rate == rate
     assert found.samples.shape == (count, 1)
     assert found.samples[0, 0] == pytest.approx(first, rel=1e-6)
+    assert found.started == started
+
+
+@pytest.mark.parametrize(("line", "started"), [("05-Jan-26 08:30:59", datetime(2026, 1, 5, 8, 30, 59)), ("05-Foo-26 08:30:59", None)])
+def test_a_date_among_the_id_lines_is_when_it_began(tmp_path, line, started):
+    path = tmp_path / "cut.uff"
+    write_uff(path, [record()])
+    path.write_text(path.read_text().replace(f"{'NONE':<80s}", f"{line:<80s}", 1))
+    assert read_recording(path, (sensor("x"),)).started == started
 
 
 def test_a_spectrum_that_others_measured_is_no_recording():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import tracemalloc
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -97,6 +98,21 @@ def test_big_endian(tmp_path):
     )
     (tmp_path / "cut.wav").write_bytes(b"RIFX" + struct.pack(">I", len(body)) + body)
     np.testing.assert_array_equal(read_recording(tmp_path / "cut.wav", (FIRST,)).samples[:, 0] * 2**15, values)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "started"),
+    [
+        (b"2026-01-0508:30:59", datetime(2026, 1, 5, 8, 30, 59)),
+        (b"2026:01:0508-30-59", datetime(2026, 1, 5, 8, 30, 59)),
+        (b"2026-13-0508:30:59", None),
+        (bytes(18), None),
+        (b"2026-01-05", None),
+    ],
+)
+def test_a_broadcast_wave_tells_when_it_began(tmp_path, stamp, started):
+    (tmp_path / "cut.wav").write_bytes(riff(form(), chunk(b"bext", bytes(320) + stamp), SAMPLES))
+    assert read_recording(tmp_path / "cut.wav", (FIRST,)).started == started
 
 
 @pytest.mark.parametrize(

@@ -220,6 +220,11 @@ def test_what_was_learned_comes_back(tmp_path, softening):
     path = warming_file(tmp_path, softening)
     read, wrote = machine_from_json(read_result(path), str(path)), by_hand.warming_identification(softening).machine
     assert read.warming == wrote.warming
+    law, told = by_hand.CHANGES.law, read.workpiece.coefficients
+    assert [read.workpiece.at(feed).tangential for feed in (0.1e-3, 0.3e-3)] == pytest.approx(
+        [told.tangential, 3.0**-0.08 * told.tangential]
+    )
+    assert read.workpiece.law.entry[0] == pytest.approx(law.entry[0])
     for axis, part in wrote.identified.items():
         there, here = part.posterior.warmed, read.identified[axis].posterior.warmed
         for name in ("change", "cross", "covariance"):
@@ -230,6 +235,15 @@ def test_what_was_learned_comes_back(tmp_path, softening):
     np.testing.assert_allclose(found.values, expected.values, rtol=1e-12)
     for pair, deviation in expected.deviation().items():
         np.testing.assert_allclose(found.deviation()[pair], deviation, rtol=1e-9)
+
+
+@pytest.mark.parametrize("warmed_up", [False, True])
+def test_warming_by_the_clock_comes_back(tmp_path, warmed_up):
+    wrote = LearnedWarming(-0.02, 0.001, 840.0, 1.2, warmed_up=warmed_up)
+    found = by_hand.warming_identification(changes=LearnedChanges(wrote))
+    write_result(tmp_path / "C.json", identification_to_json(found, by_hand.campaign(tmp_path), by_hand.LEFT_OUT))
+    read = machine_from_json(read_result(tmp_path / "C.json"), "C.json").warming
+    assert (read.time_constant, read.exponent, read.warmed_up) == (840.0, 1.2, warmed_up)
 
 
 def test_the_file_says_what_was_learned(tmp_path):
@@ -246,6 +260,7 @@ def test_the_file_says_what_was_learned(tmp_path):
     assert law["tangential_edge_n_per_mm"] == pytest.approx({"value": -1.9, "std": 0.3})
     assert law["entry_deg"] == [{"kind": 1, "value": pytest.approx(math.degrees(0.01)), "std": pytest.approx(math.degrees(0.002))}]
     assert law["explained_percent"] == pytest.approx(79.0)
+    assert law["feed_per_tooth_mm"] == pytest.approx(0.1)
     assert learned["joints"]["T1"] == pytest.approx({"percent": 4.0, "std_percent": 1.56})
     assert learned["joint_in_loudest_cut"]["percent"] == pytest.approx(-3.0)
     assert learned["force_scales"].keys() == {"T1-0", "T1-1"}
