@@ -12,6 +12,7 @@ import pytest
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.learned_changes import LearnedChanges, LearnedWarming
 from rcsa_ident.io.results.identifications import (
     identification_to_json,
     machine_from_json,
