@@ -19,8 +19,8 @@ ORDER, SCALE, GRIP, GIVING_WAY = 0.1, 0.03, 0.08, 0.025
 FRICTION, FRICTION_SPREAD, TIME_SPREAD, START, OFF_COURSE = 1.25, 0.2, float(np.log(2.0)), 0.4, 0.04
 #: For which the spindle turns on at most where the next cut comes later [s].
 LONGEST_TURNING = 2.0 * USUAL_PAUSE
-#: A pause in which nobody knows what the spindle did [s].
-LONG_PAUSE = 600.0
+#: A pause in which nobody knows what the spindle did [s], and how many of them are told from each other: of more none is.
+LONG_PAUSE, MOST_PAUSES = 600.0, 8
 #: Steps of its unknowns within which a course is a straight line; and that of their differences.
 NEAR, _STEP = 0.3, 1e-4
 
@@ -196,7 +196,8 @@ def _sessions(data: IdentificationData) -> tuple[np.ndarray, FloatArray, np.ndar
     """Places of the cuts in the order in which they were made, when that was [s], and which came first or after a long pause."""
     order = np.argsort(data.made.started, kind="stable")
     started = data.made.started[order]
-    return order, started, np.diff(started, prepend=-np.inf) > LONG_PAUSE
+    long = np.diff(started) > LONG_PAUSE
+    return order, started, np.append(True, long if np.count_nonzero(long) <= MOST_PAUSES else np.zeros_like(long))
 
 
 def _taken_up(heat: FloatArray, started: FloatArray, time_constant: float, before: FloatArray) -> FloatArray:

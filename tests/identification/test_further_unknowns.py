@@ -130,6 +130,14 @@ def test_warmth_follows_its_equation(few, warmed_up):
     assert np.abs(other).max() > 0.3
 
 
+def test_cuts_of_many_days_have_one_beginning(few):
+    data = replace(few, made=replace(few.made, started=86400.0 * np.arange(len(few.cut_ids))))
+    assert still_felt(data, 900.0).shape == (len(few.cut_ids), 1)
+    # each found the machine cold
+    assert warmth(data, 900.0).max() < 0.1
+    assert warmth(data, 900.0, warmed_up=True)[0] > 0.5
+
+
 def test_a_course_is_a_straight_line_near_another(few):
     first = Warming(few.cut_ids, 900.0)
     told = first.on(few)

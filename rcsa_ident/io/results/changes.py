@@ -57,9 +57,9 @@ def _law(found: ForceLaw) -> dict[str, Any]:
 def law_of(top: Table) -> ForceLaw | None:
     """Return the law of the force that a result has learned; None where it does not say so."""
     table = top.table("learned", default={})
-    if "force_law" not in table:
+    law = table.table("force_law", default={})
+    if "feed_per_tooth_mm" not in law:
         return None
-    law = table.table("force_law")
     k_te, k_re = (_pair(law.table(f"{name}_edge_n_per_mm"), 1e3) for name in ("tangential", "radial"))
     entries = {each.number("kind", least=1, whole=True) - 1: _pair(each, float(np.radians(1.0))) for each in law.tables("entry_deg")}
     explained = 1e-2 * law.number("explained_percent", "%", least=0.0)
