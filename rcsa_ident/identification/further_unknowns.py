@@ -129,9 +129,9 @@ class Warming:
     def on(self, data: IdentificationData) -> IdentificationData:
         """Return the same data with the warmth of each cut in the model.
 
-        What is not known of it are further unknowns: the clock's time constant and exponent, how warm the machine was at the first cut
-        and after each long pause, and a deviation of each cut. The answer is for the warm machine: as warm as it becomes at each speed,
-        as it was in the cuts on average where it had turned before, or as the highest temperature that was told.
+        What is not known of it are further unknowns: the clock's time constant and exponent, a deviation of each cut, and, of a spindle
+        that had turned before, how warm the machine was at the first cut and after each long pause. The answer is for the warm machine: as
+        warm as it becomes at each speed, as it was in the cuts on average where it had turned before, or as the highest temperature.
         """
         own = OFF_COURSE * np.equal.outer(np.array(data.cut_ids[: data.cuts]), np.array(self.cut_ids)).astype(float)
         learned, steady = ~data.made.judged, 0.0
@@ -150,11 +150,12 @@ class Warming:
             middle = colder(self.time_constant, self.exponent)
             slower = TIME_SPREAD * (colder(self.time_constant * np.exp(_STEP), self.exponent) - middle) / _STEP
             steeper = FRICTION_SPREAD * (colder(self.time_constant, self.exponent + _STEP) - middle) / _STEP
-            common = np.column_stack([slower, steeper, START * still_felt(data, self.time_constant)])
+            ways = np.column_stack([slower, steeper])
             if self.warmed_up:
+                ways = np.hstack([ways, START * still_felt(data, self.time_constant)])
                 # how warm it would become nobody has seen
-                middle, common = middle - middle[learned].mean(), common - common[learned].mean(axis=0)
-            ways = np.hstack([common, own])
+                middle, ways = middle - middle[learned].mean(), ways - ways[learned].mean(axis=0)
+            ways = np.hstack([ways, own])
         more, first = data.with_unknowns((1.0,) * ways.shape[1], None), len(data.coefficient_spread)
         return replace(more, warmth=middle, course=ways, course_first=first, steady=steady, further=(*data.further, self))
 

@@ -91,7 +91,7 @@ def test_each_has_its_places(rich):
     for each in data.further:
         other = each.on(other)
     assert len(other.coefficient_spread) == len(data.coefficient_spread)
-    assert not np.any(other.course[0, 3:])
+    assert not np.any(other.course[0, 2:])
 
 
 def after(warm, heat, time):
@@ -148,8 +148,18 @@ def test_a_course_is_a_straight_line_near_another(few):
     assert moved.time_constant == pytest.approx(900.0 * 2.0**0.4)
     bent = moved.on(few).warmth - told.warmth
     np.testing.assert_allclose(told.course @ values, bent, atol=0.25 * np.abs(bent).max())
-    values[3:] = 1.0
+    values[2:] = 1.0
     np.testing.assert_allclose((told.course @ values)[: told.cuts], told.course[:, :2] @ values[:2] + 0.04, atol=1e-12)
+
+
+def test_after_a_warm_up_the_answer_is_the_machine_of_the_cuts(few):
+    judged = np.arange(len(few.cut_ids)) == len(few.cut_ids) - 1
+    data = replace(few, made=replace(few.made, judged=judged))
+    told = Warming(few.cut_ids, 900.0, warmed_up=True).on(data)
+    common = np.column_stack([told.warmth, told.course[:, :3]])[~judged]
+    np.testing.assert_allclose(common.mean(axis=0), 0.0, atol=1e-12)
+    # the first cut feels most of what was before, the later ones less and less
+    assert np.all(np.diff(told.course[np.argsort(data.made.started), 2]) < 0.0)
 
 
 def test_a_thermometer_tells_the_warmest_cut(few):
