@@ -19,7 +19,7 @@ from rcsa_ident.identification.coupled.fit import coupled_starts, fit_coupled
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.score import STRIKES, Coupling, coupling
 from rcsa_ident.identification.data import SMOOTH_ERROR, IdentificationData
-from rcsa_ident.identification.diagnostics import WORST_OF_ROUGH, failed, not_finite
+from rcsa_ident.identification.diagnostics import failed, not_finite
 from rcsa_ident.identification.further_unknowns import Further, Warming
 from rcsa_ident.identification.joint_fit import (
     AxisSearch,
@@ -65,8 +65,9 @@ ENOUGH = 40
 #: 55 and more where they do (no benchmark prints scores); and by how much the fit of both together has to be better to need no other:
 #: exchanging and adding modes gains a few hundred, planes that feel each other thousands.
 PLAIN, PLAIN_GAIN = 50.0, 1000.0
-#: Share of what planes that feel each other would explain from which a cause is asked first. It was 1.3 and more on two machines that lack
-#: ideals (7101 and 7102 of `benchmarks.ideals`), 0.3 on one whose planes feel each other alone; no benchmark prints it.
+#: Share of what planes that feel each other would explain from which a cause is asked first. It was 1.3 and more on two machines with wrong
+#: forces, a warming spindle and new clampings (7101 and 7102 of `benchmarks.ideals`), 0.3 on one whose planes feel each other alone; no
+#: benchmark prints it.
 LIKE_COUPLING = 0.6
 
 
@@ -121,11 +122,9 @@ class EvidenceSelection:
             if whole is not data:
                 assert isinstance(found, PlaneFit | CoupledFit)
                 found = replace(found, whole=whole)
-            # what drawings far from the truth leave no cause explains: ever more modes would try (`benchmarks.rough`, 407)
-            far_off = data.rough is not None and max(found.misfit.model_error) > WORST_OF_ROUGH
-            if isinstance(found, PlaneFit) and not (data.sweeps or data.tests or far_off):
+            if isinstance(found, PlaneFit) and not data.sweeps and not data.tests and data.rough is None:
                 first, found = found, self._freed(found, whole, sequence, map, trace, progress)
-                if data.rough is None and (found.data.further or first.deferred):
+                if found.data.further or first.deferred:
                     found = self._asked_of_the_rest(first, found, map, _report_to(BOTH, trace, progress))
             return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
@@ -174,10 +173,7 @@ class EvidenceSelection:
                 return found
             refused.add(further[0])
             try:
-                # of rough drawings from the answer on, at toolings that are near to the true ones: several searches have led to it
-                start = self.start if whole.rough is None else found.answer(0, self.name).machine.starts()
-                at_answer = whole if whole.rough is None else whole.with_toolings_at(found.rough_values)
-                other = replace(self, start=start)._with(further[1], at_answer, sequence, map, trace, progress)
+                other = self._with(further[1], whole, sequence, map, trace, progress)
             except (ArithmeticError, np.linalg.LinAlgError):
                 continue
             if other is not None and other.evidence < found.evidence - BELIEVED:
