@@ -20,9 +20,9 @@ _RANGES = {
     "radial_edge": ("radial_edge", EDGE),
     "axial_edge": ("axial_edge", EDGE),
 }
+_SPREADS = ("tangential_spread", "ratio_spread", "edge_spread")
 #: Chip at which a curved law has the K_tc of its straight line [m]; standard deviations from which on a part of it is told.
 REFERENCE_CHIP, _TOLD = 5e-5, 2.0
-_SPREADS = ("tangential_spread", "ratio_spread", "edge_spread")
 
 
 def checked_coefficient(field: str, value: float) -> float:

@@ -215,8 +215,8 @@ def learned(found: LearnedChanges) -> list[Remark]:
     if found.orders:
         off = 100.0 * float(np.sqrt(np.mean([abs(each.log) ** 2 for each in found.orders.values()])))
         words = (
-            f"the forces differ from the simulated ones by {off:.2g} % in the orders of the teeth: the identification has learned "
-            "that, lobes and monitored forces have not; check engagement and edge forces, or calibrate the coefficients"
+            f"the forces differ from the simulated ones by {off:.2g} % in the orders of the teeth: the identification has learned that, "
+            "lobes at the feed of the cuts and monitored forces have not; check engagement and edge forces, or calibrate the coefficients"
         )
         told.append((Cause.ORDER, words))
     if found.scales:

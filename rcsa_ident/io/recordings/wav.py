@@ -166,6 +166,4 @@ def _moment(broadcast: bytes) -> datetime | None:
     """Date and time of a broadcast wave's extension, where it has them: behind its description and its two names of the originator."""
     text = broadcast[320:338].decode("latin-1")
     # separators are the recorder's own
-    return (
-        moment_of("".join(c if c.isdigit() else " " for c in f"{text[:10]} {text[10:]}"), "%Y %m %d %H %M %S") if len(text) == 18 else None
-    )
+    return moment_of("".join(c if c.isdigit() else " " for c in f"{text[:10]} {text[10:]}"), "%Y %m %d %H %M %S")

@@ -23,7 +23,7 @@ export function learned(modes) {
       null,
       modes.learned.map((each) => h("li", null, each)),
     ),
-    h("p", { class: "small soft" }, "Modes, tooltip FRFs and limits are those of the warm machine, where it warms up."),
+    h("p", { class: "small soft" }, "Modes, tooltip FRFs and limits hold for the warm machine, or for the machine as warm as in its cuts: each answer names its state."),
   );
   box.classList.add("wide");
   return box;
