@@ -34,6 +34,7 @@ class JobBackend(Protocol):
     """A durable engine: a job that was submitted is carried out until its call returns.
 
     Each kind of jobs has a queue of its own: none waits behind jobs of another kind.
+    Once it has started, every call may raise `Unavailable`.
     """
 
     def start(self, executor: str, carry: Carry, kinds: Sequence[str]) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import logging
 import sqlite3
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from typing import Any
 
 from dbos import DBOS, DBOSClient, DBOSConfig
 from dbos import Serializer as _Serializer
+from sqlalchemy.exc import OperationalError, TimeoutError
 
 from api.jobs.backend import VERSION, Carried, Carry
+from api.stores.entities import Unavailable
 
 #: Interval between two polls for a job [s].
 POLL = 0.5
@@ -70,25 +72,35 @@ class Durable:
         DBOS.launch()
         for queue in queues:
             DBOS.register_queue(queue, worker_concurrency=1, polling_interval_sec=POLL)
-        self.client = DBOSClient(system_database_url=self.url, serializer=Json(), application_name=_NAME, system_database_pool_size=2)
+        # which would wait for its database by itself, without a limit: the worker's heartbeats would stop with it
+        how: Any = {"application_name": _NAME, "system_database_pool_size": 2, "retry_connection_errors": False}
+        self.client = DBOSClient(system_database_url=self.url, serializer=Json(), **how)
 
     def submit(self, job: str, kind: str) -> None:
-        assert self.client is not None
         options: Any = {"workflow_name": "carry", "queue_name": _queue(kind), "workflow_id": job, "app_version": VERSION}
-        self.client.enqueue(options, job)
+        with self._asking() as client:
+            client.enqueue(options, job)
 
     def carried(self) -> Sequence[Carried]:
-        assert self.client is not None
-        rows = self.client.list_workflows(name="carry", load_input=False, load_output=False)
+        with self._asking() as client:
+            rows = client.list_workflows(name="carry", load_input=False, load_output=False)
         return [Carried(row.workflow_id, _STATES.get(row.status, "over"), row.executor_id, row.app_version == VERSION) for row in rows]
 
     def resume(self, job: str, kind: str) -> None:
-        assert self.client is not None
-        self.client.resume_workflow(job, queue_name=_queue(kind))
+        with self._asking() as client:
+            client.resume_workflow(job, queue_name=_queue(kind))
 
     def forget(self, jobs: Sequence[str]) -> None:
+        with self._asking() as client:
+            client.delete_workflows(list(jobs))
+
+    @contextmanager
+    def _asking(self) -> Iterator[DBOSClient]:
         assert self.client is not None
-        self.client.delete_workflows(list(jobs))
+        try:
+            yield self.client
+        except (OperationalError, TimeoutError) as error:
+            raise Unavailable from error
 
 
 def _queue(kind: str) -> str:

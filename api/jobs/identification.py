@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from api.jobs.job_context import JobContext
+from api.jobs.job_context import JobContext, patiently
 from api.stores.entities import digest_of, whole
 from api.stores.jobs import Applied, Job, Outcome
 from api.work import tasks
@@ -60,8 +60,8 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     Raises `InputError`: the campaign is gone or has changed, or none of its cuts is usable and there is no hammer test.
     """
     request = json.loads(whole(job.request, job.request_digest, f"request of the job {job.id}", "ask for the job once more"))
-    start, robot = (context.jobs.text(job.id, name) for name in ("start", "robot"))
-    campaign, read, read_test = load(job.group, str(job.campaign))
+    start, robot = (context.text(name) for name in ("start", "robot"))
+    campaign, read, read_test = patiently(lambda: load(job.group, str(job.campaign)))
     plan = context.remember("plan", lambda: [_files(each) for each in _parts(campaign)])
     campaign = _planned(campaign, plan)
     readings = _readings(campaign, read, context)

@@ -9,11 +9,11 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextvars import copy_context
-from typing import Any
+from typing import Any, TypeVar
 
 from api.codec import Unknown, decode, encode
 from api.jobs.backend import VERSION, Remember
-from api.stores.entities import Unavailable
+from api.stores.entities import Destroyed, Unavailable
 from api.stores.jobs import Event, Jobs
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.scaleout import Map
@@ -27,10 +27,28 @@ DELIVERY, PAUSE, CURVE = 0.4, 0.1, 1.0
 MANY = 1000
 #: Time for a cancelled job to end by itself [s].
 GRACE = 2.0
-#: Time without an answer of the store after which the process gives up [s].
-PATIENCE = 60.0
+#: Time without an answer of the store after which the process gives up, and pause between two questions [s].
+PATIENCE, ASKING = 60.0, 1.0
 #: The refusal of a job that needs more memory than its process may take.
 TOO_LARGE = InputError("job", "one that needs more memory than the service allows", "a smaller one, or a larger RCSA_IDENT_JOB_MEMORY")
+
+
+Answer = TypeVar("Answer")
+
+
+def patiently(ask: Callable[[], Answer]) -> Answer:
+    """Return what the store answers, and ask again while its database does not: a server that starts anew costs a job nothing.
+
+    Raises `Unavailable`: there was no answer for `PATIENCE`, or the database is damaged.
+    """
+    start = time.monotonic()
+    while True:
+        try:
+            return ask()
+        except Unavailable as error:
+            if isinstance(error, Destroyed) or time.monotonic() - start > PATIENCE:
+                raise
+            time.sleep(ASKING)
 
 
 class Stopped(Exception):
@@ -81,6 +99,10 @@ class JobContext:
         self.thread.join()
         if not self.stopped.is_set():
             self._deliver()
+
+    def text(self, name: str) -> str | None:
+        """Return an input of the job."""
+        return patiently(lambda: self.jobs.text(self.job, name))
 
     def check(self) -> None:
         """Raise `Stopped` where the job is not to continue here."""
@@ -196,7 +218,7 @@ class JobContext:
     def _deliver_until_over(self) -> None:
         while not self.over.wait(DELIVERY):
             if not self._deliver():
-                job = self.jobs.find(self.job)
+                job = patiently(lambda: self.jobs.find(self.job))
                 if job is not None and job.state == "running":
                     # another worker has taken the job over: report nothing more
                     log.error("the job belongs to another worker now")
@@ -213,16 +235,12 @@ class JobContext:
             events, self.events = self.events, []
             state, self.state = self.state, None
             further, self.came_further = self.came_further, False
-        start = time.monotonic()
-        while True:
-            try:
-                return self.jobs.tell(self.job, self.token, events, state, further)
-            except Unavailable:
-                if time.monotonic() - start > PATIENCE:
-                    log.error("the database does not answer")
-                    self.leave(1)
-                    return False
-                time.sleep(1.0)
+        try:
+            return patiently(lambda: self.jobs.tell(self.job, self.token, events, state, further))
+        except Unavailable:
+            log.error("the database does not answer")
+            self.leave(1)
+            return False
 
 
 def _text(outcome: dict[str, Any]) -> str:

@@ -65,7 +65,7 @@ def carry(job: Job, context: JobContext) -> Outcome:
     Raises `InputError`: another version of the service has accepted the question, and this one cannot read it.
     """
     try:
-        machine, toolings, question = decode(str(context.jobs.text(job.id, "question")))
+        machine, toolings, question = decode(str(context.text("question")))
     except Unknown:
         raise InputError("question", "one of another version of the service", "the same question, asked again") from None
     found: list[dict[str, Any]] = []

@@ -35,7 +35,7 @@ def carry(job: Job, context: JobContext, most: float) -> Outcome:
     Raises `InputError`: another version of the service has accepted the question, and this one cannot read it; or it is too much work.
     """
     try:
-        machine, called, tooling, request = decode(str(context.jobs.text(job.id, "question")))
+        machine, called, tooling, request = decode(str(context.text("question")))
     except Unknown:
         raise InputError("question", "one of another version of the service", "the same question, asked again") from None
     start = time.monotonic()

@@ -18,7 +18,7 @@ from typing import Any
 import psutil
 
 from api.jobs.backend import JobBackend, Remember
-from api.jobs.job_context import TOO_LARGE, Faulty, JobContext, Outdated, Stopped
+from api.jobs.job_context import TOO_LARGE, Faulty, JobContext, Outdated, Stopped, patiently
 from api.log_lines import tell, telling
 from api.stores.entities import Damaged, Unavailable
 from api.stores.jobs import Job, Jobs, Outcome, Worker
@@ -47,7 +47,7 @@ def carry(
     """
     with telling(job=id):
         try:
-            job = jobs.begin(id, token, _now())
+            job = patiently(lambda: jobs.begin(id, token, _now()))
             if job is None:
                 return
             tell(key=job.key, group=job.group)
@@ -56,7 +56,8 @@ def carry(
             if outcome is not None:
                 seconds = job.seconds + time.monotonic() - start
                 names = ("state", "status", "problem", "texts", "applied")
-                jobs.finish(id, token, Outcome(finished=_now(), seconds=seconds, **{name: getattr(outcome, name) for name in names}))
+                whole = Outcome(finished=_now(), seconds=seconds, **{name: getattr(outcome, name) for name in names})
+                patiently(lambda: jobs.finish(id, token, whole))
         except Unavailable as error:
             log.error("the database does not answer", exc_info=error)
             leave(1)
