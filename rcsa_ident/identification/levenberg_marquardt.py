@@ -86,12 +86,21 @@ def refine(
             return Solution(theta, layout, here, step is not None, step_number)
         gained = here.cost - trial.cost
         theta = theta + step
-        damping = max(0.2 * damping, 1e-8)
+        assert here.linear is not None
+        damping = max(damping * _eased(gained / here.linear.promise(step)), 1e-8)
         here = misfit.linearised(trial, theta, layout)
         quiet = quiet + 1 if gained < tolerance * here.cost else 0
         if quiet == 2:
             return Solution(theta, layout, here, True, step_number + 1)
     return Solution(theta, layout, here, False, max_steps)
+
+
+def _eased(kept: float) -> float:
+    """Factor on the damping after a step that has gained so much of what the linearised misfit had promised [marquardt1963].
+
+    One that has gained little of it was long enough: a longer one would be rejected.
+    """
+    return 0.2 if kept > 0.75 else 0.5 if kept > 0.5 else 1.0 if kept > 0.25 else 2.0
 
 
 def _step(misfit: Misfit, theta: FloatArray, layout: Unknowns, here: Evaluation, damping: float) -> FloatArray | None:

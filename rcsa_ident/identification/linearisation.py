@@ -83,6 +83,10 @@ class Linearisation:
         """Return how delay and angle of each cut follow a step of the parameters, shape (k, 2)."""
         return -_solve_pairs(self.inner, self.mixed @ step)
 
+    def promise(self, step: FloatArray) -> float:
+        """Return by how much a step of the parameters lowers the cost to first order in the residual, the cuts' unknowns following."""
+        return -float(step @ (2.0 * self.gradient + self.hessian @ step))
+
     def push(self, step: FloatArray, cuts: FloatArray) -> Residual:
         """Return the residual's change with a step of the parameters and of the cuts' unknowns."""
         shared = step[self._shared]

@@ -451,9 +451,9 @@ class _AxisAnswer:
         rows, weight = out[: own + holder], root * self.factor[:, None]
         machine = axis.omega_n, axis.factor, axis.changes, self.joint
         cross_frf_gradient(*machine, (lines.shares, self.felt.seen), self.felt.points, self.kept, weight, scale, rows)
-        compliance = _complex(out[bare])
+        compliance = complex_columns(out[bare])
         out[bare] = (RESIDUAL_UNIT * residual_turn(axis.residual)).T @ out[bare]
-        with_holder = _complex(out[own : own + holder])
+        with_holder = complex_columns(out[own : own + holder])
         force_rows(self.slope, root * self.model, out[own : own + forces])
         if self.felt.place is not None:
             change = (weight * lines.shares[:, 0] * self.felt.turned[:, None]).ravel()
@@ -475,8 +475,8 @@ class _AxisAnswer:
         return out[: own + forces], compliance
 
 
-def _complex(rows: FloatArray) -> ComplexArray:
-    """Rows of real and then imaginary parts, shape (q, 2 n), as complex columns, shape (n, q)."""
+def complex_columns(rows: FloatArray) -> ComplexArray:
+    """Return rows of real and then imaginary parts, shape (q, 2 n), as complex columns, shape (n, q)."""
     half = rows.shape[1] // 2
     found: ComplexArray = (rows[:, :half] + 1j * rows[:, half:]).T
     return found

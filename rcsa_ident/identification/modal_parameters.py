@@ -162,9 +162,13 @@ def _apart(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def residual_turn(factor: FloatArray) -> FloatArray:
-    """Return d (tt, tr, rr) / d (factor 00, 10, 11) of R = factor factor^T, shape (3, 3)."""
-    a, b, c = factor[0, 0], factor[1, 0], factor[1, 1]
-    return np.array([[2.0 * a, 0.0, 0.0], [b, a, 0.0], [0.0, 2.0 * b, 2.0 * c]])
+    """Return the change of R = factor factor^T, its upper triangle by rows, with the factor's lower triangle by rows, shape (r, r)."""
+    size = factor.shape[0]
+    rows, cols = np.tril_indices(size)
+    change = np.zeros((rows.size, size, size))
+    change[np.arange(rows.size), rows] = factor[:, cols].T
+    change += change.transpose(0, 2, 1)
+    return np.ascontiguousarray(change[:, *np.triu_indices(size)].T)
 
 
 def lower_factor(rows: FloatArray) -> FloatArray:

@@ -26,7 +26,7 @@ from rcsa_ident.identification.unknowns import Layout
 #: Weight of cuts that take no part: their delays are still fitted.
 _NO_PART = 1e-10
 #: Steps of the polish without a tooling, the relative gain below which it ends, and delays that are tried over a tooth's pitch.
-_STEPS, _GAIN, _GRID = 100, 1e-6, 32
+_STEPS, _GAIN, _GRID = 40, 1e-4, 32
 #: Errors up to so many times what was promised are as promised: 95 % of them.
 WITHIN = 2.0
 #: Where half of the lines are promised no better than this, nothing is.

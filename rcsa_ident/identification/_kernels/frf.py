@@ -1,7 +1,8 @@
 """Cross FRF of a candidate and its gradient, many frequencies at a time; arrays and scalars only.
 
-Scaled units as in `_kernels`. Frequencies are the innermost loop, real and imaginary parts rows of their own: what the compiler puts
-into vector registers. A loop fills one row alone, as more of them would have to be proven apart.
+Scaled units as in `_kernels`. Frequencies are the innermost loop, real and imaginary parts apart: what the compiler puts into vector
+registers. A sheet, (rows, 2, BLOCK), is small enough for the nearest cache. Its rows go by their numbers: a row cut out of it as an
+array of its own would cost as much as the work on it.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numba
 import numpy as np
 
 #: Frequencies that are worked on together.
-BLOCK = 128
+BLOCK = 64
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -51,10 +52,10 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
     static = residual.copy()
     static[0, 0], static[0, 1] = residual[0, 0] ** 2, residual[0, 0] * residual[1, 0]
     static[1, 0], static[1, 1] = static[0, 1], residual[1, 0] ** 2 + residual[1, 1] ** 2
-    # the right sides stand below the matrix
-    matrix = np.empty((m + sides, m, 2, BLOCK))
+    # of the matrix by rows, and of the right sides below it
+    sheet = np.empty(((m + sides) * m, 2, BLOCK))
     squared, turn, soften, stiffer = np.empty(BLOCK), np.empty(BLOCK), np.empty((states, BLOCK)), np.empty(BLOCK)
-    machine = np.empty((sides, 2, 2, BLOCK))
+    machine = np.empty((2 * sides, 2, BLOCK))
     for block in range(kept.shape[0]):
         first = block * BLOCK
         size = min(BLOCK, n - first)
@@ -64,51 +65,61 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
         for i in range(m):
             for j in range(i + 1):
                 lost = damping[i, j]
-                real, imag = matrix[i, j, 0], matrix[i, j, 1]
+                row = i * m + j
                 for f in range(size):
-                    real[f] = 0.0
+                    sheet[row, 0, f] = 0.0
                 for s in range(states):
-                    bend, x = softening[s * m + i, j] * omega_n[i] * omega_n[j], soften[s]
+                    bend = softening[s * m + i, j] * omega_n[i] * omega_n[j]
                     for f in range(size):
-                        real[f] += bend * x[f]
+                        sheet[row, 0, f] += bend * soften[s, f]
                 for f in range(size):
-                    imag[f] = lost * turn[f]
-            square = omega_n[i] ** 2
-            real = matrix[i, i, 0]
+                    sheet[row, 1, f] = lost * turn[f]
+            square, row = omega_n[i] ** 2, i * m + i
             for f in range(size):
-                real[f] += square * stiffer[f] - squared[f]
+                sheet[row, 0, f] += square * stiffer[f] - squared[f]
             for a in range(sides):
-                matrix[m + a, i, 0] = psi[i, a]
-                matrix[m + a, i, 1] = 0.0
-        _factor_solve(matrix, m, size)
+                row = (m + a) * m + i
+                for f in range(size):
+                    sheet[row, 0, f] = psi[i, a]
+                    sheet[row, 1, f] = 0.0
+        _factor_solve(sheet, m, sides, size)
         for i in range(m):
             for a in range(sides):
-                kept[block, i * sides + a] = matrix[m + a, i]
+                for part in range(2):
+                    for f in range(size):
+                        kept[block, i * sides + a, part, f] = sheet[(m + a) * m + i, part, f]
         # motion of the flange and of other places per force along the flange's t and r
         for a in range(sides):
             for b in range(2):
-                machine[a, b, 0] = static[a, b]
-                machine[a, b, 1] = 0.0
-                for part in range(2):
-                    total = machine[a, b, part]
-                    for i in range(m):
-                        shape, answer = psi[i, a], matrix[m + b, i, part]
+                row = 2 * a + b
+                for f in range(size):
+                    machine[row, 0, f] = static[a, b]
+                    machine[row, 1, f] = 0.0
+                for i in range(m):
+                    shape, answer = psi[i, a], (m + b) * m + i
+                    for part in range(2):
                         for f in range(size):
-                            total[f] += shape * answer[f]
+                            machine[row, part, f] += shape * sheet[answer, part, f]
         for f in range(size):
             w, own, grip = points[first + f, 0], points[first + f, 1], points[first + f, 3]
-            here = holder[first + f]
-            b_tt, b_tr, b_rr = _at(machine[0, 0], f), _at(machine[0, 1], f), _at(machine[1, 1], f)
+            b_tt, b_tr, b_rr = _at(machine, 0, f), _at(machine, 1, f), _at(machine, 3, f)
+            a_tt, a_tr, a_rr, a_t, a_r = (
+                holder[first + f, 0],
+                holder[first + f, 1],
+                holder[first + f, 2],
+                holder[first + f, 3],
+                holder[first + f, 4],
+            )
             gives_t, gives_r = _reciprocal(complex(grip * joint[0], w * joint[2])), _reciprocal(complex(grip * joint[1], w * joint[3]))
-            e_tt = here[0] + gives_t + b_tt
-            e_tr = here[1] + b_tr
-            e_rr = here[2] + gives_r + b_rr
+            e_tt = a_tt + gives_t + b_tt
+            e_tr = a_tr + b_tr
+            e_rr = a_rr + gives_r + b_rr
             inverse = _reciprocal(e_tt * e_rr - e_tr * e_tr)
-            x0 = (e_rr * here[3] - e_tr * here[4]) * inverse
-            x1 = (e_tt * here[4] - e_tr * here[3]) * inverse
+            x0 = (e_rr * a_t - e_tr * a_r) * inverse
+            x1 = (e_tt * a_r - e_tr * a_t) * inverse
             row = m * sides
-            _put(kept[block, row], f, x0)
-            _put(kept[block, row + 1], f, x1)
+            _keep(kept, block, row, f, x0)
+            _keep(kept, block, row + 1, f, x1)
             r_r = b_rr + front * gives_r
             turned[first + f] = own * (b_tr * x0 + r_r * x1)
             f_t, f_r = b_tt + front * gives_t + behind * b_tr, b_tr + behind * r_r
@@ -116,17 +127,17 @@ def cross_frf(omega_n, shapes, factor, softening, joint, sensors, points, holder
                 flange = own * shares[o, 0]
                 b_t, b_r = flange * f_t, flange * f_r
                 for a in range(2, sides):
-                    b_t += own * shares[o, a - 1] * _at(machine[a, 0], f)
-                    b_r += own * shares[o, a - 1] * _at(machine[a, 1], f)
+                    b_t += own * shares[o, a - 1] * _at(machine, 2 * a, f)
+                    b_r += own * shares[o, a - 1] * _at(machine, 2 * a + 1, f)
                 values[first + f, o] = 0.0
                 if o == 0:
-                    b_t += here[6]
-                    b_r += here[7]
-                    values[first + f, o] = here[5]
+                    b_t += holder[first + f, 6]
+                    b_r += holder[first + f, 7]
+                    values[first + f, o] = holder[first + f, 5]
                 values[first + f, o] += b_t * x0 + b_r * x1
                 row += 2
-                _put(kept[block, row], f, (e_rr * b_t - e_tr * b_r) * inverse)
-                _put(kept[block, row + 1], f, (e_tt * b_r - e_tr * b_t) * inverse)
+                _keep(kept, block, row, f, (e_rr * b_t - e_tr * b_r) * inverse)
+                _keep(kept, block, row + 1, f, (e_tt * b_r - e_tr * b_t) * inverse)
     return values, kept, turned
 
 
@@ -159,233 +170,229 @@ def cross_frf_gradient(omega_n, factor, softening, joint, sensors, points, kept,
         for i in range(m):
             for j in range(m):
                 bend[s, i, j] = softening[s * m + i, j] * omega_n[i] * omega_n[j]
-    shape = (m, 2, BLOCK)
-    q, lq, kq, p, lp, kp = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    rest = np.empty(shape)
-    v, y = np.empty((2, 2, BLOCK)), np.empty((2, 2, BLOCK))
-    moved = np.empty((sides - 2, 2, BLOCK))
-    spare, away, none, unit = np.empty((2, BLOCK)), np.empty((2, BLOCK)), np.zeros((2, BLOCK)), np.zeros((2, BLOCK))
-    unit[0] = 1.0
-    flexible, still, sums = np.empty((4, 2, BLOCK)), np.empty((2, 2, BLOCK)), np.empty((2, 2, BLOCK))
+    # the sheet's rows: what is kept comes first
+    x = m * sides
+    q = kept.shape[1]
+    lq, kq, p, lp, kp, rest = q + m, q + 2 * m, q + 3 * m, q + 4 * m, q + 5 * m, q + 6 * m
+    v = q + 7 * m
+    y, moved = v + 2, v + 4
+    away = moved + sides - 2
+    none, unit, spare = away + 1, away + 2, away + 3
+    flexible = away + 4
+    still, sums = flexible + 4, flexible + 6
+    sheet = np.zeros((sums + 2, 2, BLOCK))
+    sheet[unit, 0] = 1.0
     turn, soften, stiffer = np.empty(BLOCK), np.empty((states, BLOCK)), np.empty(BLOCK)
     for block in range(kept.shape[0]):
         first = block * BLOCK
         size = min(BLOCK, n - first)
-        here = kept[block]
+        for row in range(q):
+            for part in range(2):
+                for f in range(size):
+                    sheet[row, part, f] = kept[block, row, part, f]
         _speed_rows(points, joint, first, size, turn, soften, stiffer)
-        _flexibility_rows(points, joint, first, size, flexible, still)
-        x0, x1 = here[m * sides], here[m * sides + 1]
+        _flexibility_rows(points, joint, first, size, sheet, flexible, still)
         for i in range(m):
-            _products(here[i * sides], x0, here[i * sides + 1], x1, 1.0, q[i, 0], q[i, 1], size)
-        _combine(factor, q, lq, size)
-        _stiffness(omega_n, bend, soften, stiffer, q, kq, rest, size)
+            _products(sheet, i * sides, x, i * sides + 1, x + 1, 1.0, q + i, size)
+        _combine(factor, sheet, q, lq, size)
+        _stiffness(omega_n, bend, soften, stiffer, sheet, q, kq, rest, size)
         for o in range(outputs):
-            start = first * outputs + o
-            _output_rows(
-                here[m * sides + 2 + 2 * o :],
-                shares[o],
-                seen[0],
-                points[first:],
-                weight[first:, o],
-                1.0 if o == 0 else 0.0,
-                size,
-                (v, y),
-                moved,
-                away,
-            )
+            place = first * outputs + o, outputs, spare
+            _output_rows(sheet, (x + 2 + 2 * o, v, y, moved, away), shares, o, seen[0], points, weight, first, size)
             for i in range(m):
-                _products(here[i * sides], v[0], here[i * sides + 1], v[1], 1.0, p[i, 0], p[i, 1], size)
+                _products(sheet, i * sides, v, i * sides + 1, v + 1, 1.0, p + i, size)
                 for a in range(2, sides):
-                    _add_product(here[i * sides + a], moved[a - 2], p[i], size)
-            _combine(factor, p, lp, size)
-            _stiffness(omega_n, bend, soften, stiffer, p, kp, rest, size)
+                    _add_product(sheet, i * sides + a, moved + a - 2, p + i, size)
+            _combine(factor, sheet, p, lp, size)
+            _stiffness(omega_n, bend, soften, stiffer, sheet, p, kp, rest, size)
             for i in range(m):
                 k = m + 2 * i
-                _line(p[i], kq[i], kp[i], q[i], -scale[i], out[i], start, outputs, spare, size)
-                _line(v[0], q[i], p[i], x0, scale[k], out[k], start, outputs, spare, size)
-                _line(v[1], q[i], p[i], x1, scale[k + 1], out[k + 1], start, outputs, spare, size)
+                _line(sheet, (p + i, kq + i, kp + i, q + i), -scale[i], out, i, place, size)
+                _line(sheet, (v, q + i, p + i, x), scale[k], out, k, place, size)
+                _line(sheet, (v + 1, q + i, p + i, x + 1), scale[k + 1], out, k + 1, place, size)
             k = 3 * m + pairs
-            _line(v[0], x0, none, x0, scale[k], out[k], start, outputs, spare, size)
-            _line(v[0], x1, v[1], x0, scale[k + 1], out[k + 1], start, outputs, spare, size)
-            _line(v[1], x1, none, x1, scale[k + 2], out[k + 2], start, outputs, spare, size)
+            _line(sheet, (v, x, none, x), scale[k], out, k, place, size)
+            _line(sheet, (v, x + 1, v + 1, x), scale[k + 1], out, k + 1, place, size)
+            _line(sheet, (v + 1, x + 1, none, x), scale[k + 2], out, k + 2, place, size)
             k += 3
             for a in range(sides - 2):
                 for i in range(m):
-                    _line(moved[a], q[i], none, x0, scale[k], out[k], start, outputs, spare, size)
+                    _line(sheet, (moved + a, q + i, none, x), scale[k], out, k, place, size)
                     k += 1
-                for x in (x0, x1):
-                    _line(moved[a], x, none, x0, scale[k], out[k], start, outputs, spare, size)
+                for c in range(2):
+                    _line(sheet, (moved + a, x + c, none, x), scale[k], out, k, place, size)
                     k += 1
             if stills:
                 # all natural frequencies, and all of the damping, by a share
-                sums[:] = 0.0
-                for i in range(m):
-                    _add_product(p[i], kq[i], sums[0], size)
-                    _add_product(lp[i], lq[i], sums[1], size)
                 for a in range(2):
-                    _line(sums[a], still[a], none, x0, scale[k], out[k], start, outputs, spare, size)
+                    _nothing(sheet, sums + a, size)
+                for i in range(m):
+                    _add_product(sheet, p + i, kq + i, sums, size)
+                    _add_product(sheet, lp + i, lq + i, sums + 1, size)
+                for a in range(2):
+                    _line(sheet, (sums + a, still + a, none, x), scale[k], out, k, place, size)
                     k += 1
             for s in range(states):
                 # the omegas' rows are done with it
                 for i in range(m):
-                    _times(p[i], soften[s], kp[i], size)
+                    for part in range(2):
+                        for f in range(size):
+                            sheet[kp + i, part, f] = soften[s, f] * sheet[p + i, part, f]
                 for i in range(m):
                     for j in range(i + 1):
                         share = -omega_n[i] * omega_n[j] * scale[k] * (0.5 if i == j else 1.0)
-                        _line(kp[i], q[j], kp[j], q[i], share, out[k], start, outputs, spare, size)
+                        _line(sheet, (kp + i, q + j, kp + j, q + i), share, out, k, place, size)
                         k += 1
             # what moves with the holder moves with the joint's own flexibility, too
             felt, sign = (v, -1.0) if seen[1] == 1.0 else (y, 1.0)
-            _products(felt[0], x0, none, x0, sign, sums[0, 0], sums[0, 1], size)
-            _products(felt[1], x1, none, x1, sign, sums[1, 0], sums[1, 1], size)
+            for a in range(2):
+                _products(sheet, felt + a, x + a, none, x, sign, sums + a, size)
             for a in range(4):
-                _line(sums[a % 2], flexible[a], none, x0, scale[k], out[k], start, outputs, spare, size)
+                _line(sheet, (sums + a % 2, flexible + a, none, x), scale[k], out, k, place, size)
                 k += 1
             if k < out.shape[0]:
-                _products(y[0], x0, none, x0, 1.0, sums[0, 0], sums[0, 1], size)
-                _products(y[1], x1, none, x1, 1.0, sums[1, 0], sums[1, 1], size)
-                _line(sums[0], unit, none, x0, -1.0, out[k], start, outputs, spare, size)
-                _line(y[0], x1, y[1], x0, -1.0, out[k + 1], start, outputs, spare, size)
-                _line(sums[1], unit, none, x0, -1.0, out[k + 2], start, outputs, spare, size)
-                _line(y[0], unit, away, x0, 1.0, out[k + 3], start, outputs, spare, size)
-                _line(y[1], unit, away, x1, 1.0, out[k + 4], start, outputs, spare, size)
-                _line(none, x0, away, unit, -1.0, out[k + 5], start, outputs, spare, size)
+                for a in range(2):
+                    _products(sheet, y + a, x + a, none, x, 1.0, sums + a, size)
+                _line(sheet, (sums, unit, none, x), -1.0, out, k, place, size)
+                _line(sheet, (y, x + 1, y + 1, x), -1.0, out, k + 1, place, size)
+                _line(sheet, (sums + 1, unit, none, x), -1.0, out, k + 2, place, size)
+                _line(sheet, (y, unit, away, x), 1.0, out, k + 3, place, size)
+                _line(sheet, (y + 1, unit, away, x + 1), 1.0, out, k + 4, place, size)
+                _line(sheet, (none, x, away, unit), -1.0, out, k + 5, place, size)
             # -i w (factor)(factor)^T
             for i in range(m):
-                _quarter_turn(p[i], turn, spare, size)
-                _quarter_turn(lp[i], turn, spare, size)
+                _quarter_turn(sheet, p + i, turn, spare, size)
+                _quarter_turn(sheet, lp + i, turn, spare, size)
             k = 3 * m
             for i in range(m):
                 for j in range(i + 1):
-                    _line(p[i], lq[j], lp[j], q[i], scale[k], out[k], start, outputs, spare, size)
+                    _line(sheet, (p + i, lq + j, lp + j, q + i), scale[k], out, k, place, size)
                     k += 1
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _factor_solve(matrix, m, size):
+def _factor_solve(sheet, m, sides, size):
     """Solve complex symmetric systems in place: L D L^T, lower triangle read, the right sides below it overwritten."""
     for j in range(m):
-        p, q = matrix[j, j, 0], matrix[j, j, 1]
+        own = j * m + j
         for f in range(size):
-            inverse = 1.0 / (p[f] * p[f] + q[f] * q[f])
-            p[f] *= inverse
-            q[f] *= -inverse
+            real, imag = sheet[own, 0, f], sheet[own, 1, f]
+            inverse = 1.0 / (real * real + imag * imag)
+            sheet[own, 0, f] = real * inverse
+            sheet[own, 1, f] = imag * -inverse
         for i in range(j + 1, m):
             # L stands above the diagonal
-            a, b, real, imag = matrix[i, j, 0], matrix[i, j, 1], matrix[j, i, 0], matrix[j, i, 1]
-            for f in range(size):
-                real[f] = a[f] * p[f] - b[f] * q[f]
-            for f in range(size):
-                imag[f] = a[f] * q[f] + b[f] * p[f]
-            for k in range(i, matrix.shape[0]):
-                _subtract_product(matrix[j, i], matrix[k, j], matrix[k, i], size)
-    for k in range(m, matrix.shape[0]):
+            ratio = j * m + i
+            _product(sheet, i * m + j, own, ratio, size)
+            for k in range(i, m + sides):
+                _subtract_product(sheet, ratio, k * m + j, k * m + i, size)
+    for k in range(m, m + sides):
         for j in range(m - 1, -1, -1):
-            a, b, p, q = matrix[k, j, 0], matrix[k, j, 1], matrix[j, j, 0], matrix[j, j, 1]
+            own, row = j * m + j, k * m + j
             for f in range(size):
-                real = a[f] * p[f] - b[f] * q[f]
-                b[f] = a[f] * q[f] + b[f] * p[f]
-                a[f] = real
+                real = sheet[row, 0, f] * sheet[own, 0, f] - sheet[row, 1, f] * sheet[own, 1, f]
+                sheet[row, 1, f] = sheet[row, 0, f] * sheet[own, 1, f] + sheet[row, 1, f] * sheet[own, 0, f]
+                sheet[row, 0, f] = real
             for i in range(j + 1, m):
-                _subtract_product(matrix[j, i], matrix[k, i], matrix[k, j], size)
+                _subtract_product(sheet, j * m + i, k * m + i, row, size)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _subtract_product(a, b, out, size):
-    p, q, c, d = a[0], a[1], b[0], b[1]
-    real, imag = out[0], out[1]
-    for f in range(size):
-        real[f] -= p[f] * c[f] - q[f] * d[f]
-    for f in range(size):
-        imag[f] -= p[f] * d[f] + q[f] * c[f]
+def _nothing(sheet, row, size):
+    for part in range(2):
+        for f in range(size):
+            sheet[row, part, f] = 0.0
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _add_product(a, b, out, size):
-    p, q, c, d = a[0], a[1], b[0], b[1]
-    real, imag = out[0], out[1]
+def _product(sheet, a, b, row, size):
     for f in range(size):
-        real[f] += p[f] * c[f] - q[f] * d[f]
+        sheet[row, 0, f] = sheet[a, 0, f] * sheet[b, 0, f] - sheet[a, 1, f] * sheet[b, 1, f]
     for f in range(size):
-        imag[f] += p[f] * d[f] + q[f] * c[f]
+        sheet[row, 1, f] = sheet[a, 0, f] * sheet[b, 1, f] + sheet[a, 1, f] * sheet[b, 0, f]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _products(a, b, c, d, scale, real, imag, size):
-    """Fill scale (a b + c d)."""
-    a_r, a_i, b_r, b_i, c_r, c_i, d_r, d_i = a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]
+def _subtract_product(sheet, a, b, row, size):
     for f in range(size):
-        real[f] = scale * (a_r[f] * b_r[f] - a_i[f] * b_i[f] + c_r[f] * d_r[f] - c_i[f] * d_i[f])
+        sheet[row, 0, f] -= sheet[a, 0, f] * sheet[b, 0, f] - sheet[a, 1, f] * sheet[b, 1, f]
     for f in range(size):
-        imag[f] = scale * (a_r[f] * b_i[f] + a_i[f] * b_r[f] + c_r[f] * d_i[f] + c_i[f] * d_r[f])
+        sheet[row, 1, f] -= sheet[a, 0, f] * sheet[b, 1, f] + sheet[a, 1, f] * sheet[b, 0, f]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _line(a, b, c, d, scale, out, first, step, spare, size):
-    """Fill scale (a b + c d) into `out` from `first` on, every `step`, and the imaginary parts half of it further."""
-    half = out.size // 2
-    if step == 1:
-        _products(a, b, c, d, scale, out[first : first + size], out[half + first : half + first + size], size)
-        return
-    real, imag = spare[0], spare[1]
-    _products(a, b, c, d, scale, real, imag, size)
+def _add_product(sheet, a, b, row, size):
     for f in range(size):
-        out[first + f * step] = real[f]
+        sheet[row, 0, f] += sheet[a, 0, f] * sheet[b, 0, f] - sheet[a, 1, f] * sheet[b, 1, f]
     for f in range(size):
-        out[half + first + f * step] = imag[f]
+        sheet[row, 1, f] += sheet[a, 0, f] * sheet[b, 1, f] + sheet[a, 1, f] * sheet[b, 0, f]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _combine(coefficients, rows, out, size):
-    """out_j = sum_i coefficients_ij rows_i."""
+def _products(sheet, a, b, c, d, scale, row, size):
+    """Fill a row with scale (a b + c d)."""
+    for f in range(size):
+        first = sheet[a, 0, f] * sheet[b, 0, f] - sheet[a, 1, f] * sheet[b, 1, f]
+        sheet[row, 0, f] = scale * (first + sheet[c, 0, f] * sheet[d, 0, f] - sheet[c, 1, f] * sheet[d, 1, f])
+    for f in range(size):
+        first = sheet[a, 0, f] * sheet[b, 1, f] + sheet[a, 1, f] * sheet[b, 0, f]
+        sheet[row, 1, f] = scale * (first + sheet[c, 0, f] * sheet[d, 1, f] + sheet[c, 1, f] * sheet[d, 0, f])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _line(sheet, rows, scale, out, line, place, size):
+    """Fill a row of `out` with scale (a b + c d), and the imaginary parts half of it further.
+
+    `rows`: numbers of a, b, c and d; `place`: where it begins, the step to the next one, and a row of the sheet that is free
+    """
+    a, b, c, d = rows
+    first, step, spare = place
+    half = out.shape[1] // 2
+    _products(sheet, a, b, c, d, scale, spare, size)
+    for f in range(size):
+        out[line, first + f * step] = sheet[spare, 0, f]
+    for f in range(size):
+        out[line, half + first + f * step] = sheet[spare, 1, f]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _combine(coefficients, sheet, rows, to, size):
+    """Row j from `to` on = sum_i coefficients_ij row i from `rows` on."""
     for j in range(coefficients.shape[1]):
-        for part in range(2):
-            total = out[j, part]
-            total[:] = 0.0
-            for i in range(coefficients.shape[0]):
-                share, row = coefficients[i, j], rows[i, part]
-                if share != 0.0:
+        _nothing(sheet, to + j, size)
+        for i in range(coefficients.shape[0]):
+            share = coefficients[i, j]
+            if share != 0.0:
+                for part in range(2):
                     for f in range(size):
-                        total[f] += share * row[f]
+                        sheet[to + j, part, f] += share * sheet[rows + i, part, f]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _stiffness(omega_n, bend, soften, stiffer, rows, out, rest, size):
-    """out = K rows."""
+def _stiffness(omega_n, bend, soften, stiffer, sheet, rows, to, rest, size):
+    """Rows from `to` on = K times those from `rows` on."""
     for i in range(omega_n.size):
         square = omega_n[i] ** 2
         for part in range(2):
-            row, total = rows[i, part], out[i, part]
             for f in range(size):
-                total[f] = square * stiffer[f] * row[f]
+                sheet[to + i, part, f] = square * stiffer[f] * sheet[rows + i, part, f]
     for s in range(bend.shape[0]):
-        _combine(bend[s], rows, rest, size)
-        x = soften[s]
+        _combine(bend[s], sheet, rows, rest, size)
         for i in range(omega_n.size):
             for part in range(2):
-                more, total = rest[i, part], out[i, part]
                 for f in range(size):
-                    total[f] += x[f] * more[f]
+                    sheet[to + i, part, f] += soften[s, f] * sheet[rest + i, part, f]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _times(row, factor, out, size):
-    for part in range(2):
-        own, product = row[part], out[part]
-        for f in range(size):
-            product[f] = factor[f] * own[f]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _quarter_turn(row, turn, spare, size):
-    """row *= -i turn."""
-    real, imag, old = row[0], row[1], spare[0]
+def _quarter_turn(sheet, row, turn, spare, size):
+    """The row *= -i turn."""
     for f in range(size):
-        old[f] = real[f]
+        sheet[spare, 0, f] = sheet[row, 0, f]
     for f in range(size):
-        real[f] = turn[f] * imag[f]
+        sheet[row, 0, f] = turn[f] * sheet[row, 1, f]
     for f in range(size):
-        imag[f] = -turn[f] * old[f]
+        sheet[row, 1, f] = -turn[f] * sheet[spare, 0, f]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -401,35 +408,36 @@ def _speed_rows(points, joint, first, size, turn, soften, stiffer):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _output_rows(kept, shares, behind, points, weight, direct, size, answers, moved, away):
-    """An output's v and y, its shares of the other places and minus that of the tool-holder's own point, which is the first output's
-    alone, times the lines' weights.
+def _output_rows(sheet, places, shares, o, behind, points, weight, first, size):
+    """Of an output v and y, its shares of the other places and minus that of the tool-holder's own point, which is the first output's
+    alone, times the lines' weights. `places`: rows of y without weight, and where these stand.
     """
-    v, y = answers
+    answer, v, y, moved, away = places
+    direct = 1.0 if o == 0 else 0.0
     for f in range(size):
-        own, by = points[f, 1], weight[f]
+        own, by = points[first + f, 1], weight[first + f, o]
         for a in range(2):
-            answer = _at(kept[a], f) * by
-            _put(y[a], f, answer)
-            _put(v[a], f, own * shares[0] * (1.0 if a == 0 else behind) * by - answer)
-        for e in range(moved.shape[0]):
-            _put(moved[e], f, own * shares[1 + e] * by)
-        _put(away, f, direct * (own - 1.0) * by)
+            weighted = _at(sheet, answer + a, f) * by
+            _put(sheet, y + a, f, weighted)
+            _put(sheet, v + a, f, own * shares[o, 0] * (1.0 if a == 0 else behind) * by - weighted)
+        for e in range(away - moved):
+            _put(sheet, moved + e, f, own * shares[o, 1 + e] * by)
+        _put(sheet, away, f, direct * (own - 1.0) * by)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _flexibility_rows(points, joint, first, size, flexible, still):
+def _flexibility_rows(points, joint, first, size, sheet, flexible, still):
     """How the joint's flexibility falls with its stiffnesses and dampings; what standing still does to stiffness and damping."""
     for f in range(size):
         w, stands, grip = points[first + f, 0], points[first + f, 2], points[first + f, 3]
         for a in range(2):
             inverse = _reciprocal(complex(grip * joint[a], w * joint[2 + a]))
             inverse *= inverse
-            _put(flexible[a], f, grip * inverse)
-            _put(flexible[2 + a], f, complex(0.0, w) * inverse)
+            _put(sheet, flexible + a, f, grip * inverse)
+            _put(sheet, flexible + 2 + a, f, complex(0.0, w) * inverse)
         if joint.size == 6:
-            _put(still[0], f, complex(-2.0 * stands / (1.0 + stands * joint[4]), 0.0))
-            _put(still[1], f, complex(0.0, -w * stands))
+            _put(sheet, still, f, complex(-2.0 * stands / (1.0 + stands * joint[4]), 0.0))
+            _put(sheet, still + 1, f, complex(0.0, -w * stands))
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -439,10 +447,15 @@ def _reciprocal(z):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _at(row, f):
-    return complex(row[0, f], row[1, f])
+def _at(sheet, row, f):
+    return complex(sheet[row, 0, f], sheet[row, 1, f])
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _put(row, f, z):
-    row[0, f], row[1, f] = z.real, z.imag
+def _put(sheet, row, f, z):
+    sheet[row, 0, f], sheet[row, 1, f] = z.real, z.imag
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _keep(kept, block, row, f, z):
+    kept[block, row, 0, f], kept[block, row, 1, f] = z.real, z.imag

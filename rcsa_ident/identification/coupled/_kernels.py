@@ -1,8 +1,7 @@
-"""Lines of a machine whose planes feel each other, and of a robot at postures, with their gradient; arrays and scalars only.
+"""Lines of a machine whose planes feel each other, and their gradient, many points at a time; arrays and scalars only.
 
-Scaled units as in `identification._kernels`: slopes are multiplied and moments divided by a lever, all receptances are in m/N.
-
-Both stand in one file with what they share: a compiled kernel that is kept does not notice a change in another one.
+Scaled units as in `identification._kernels`: slopes are multiplied and moments divided by a lever, all receptances are in m/N. Sheets and
+their rows are those of `identification._kernels.frf`.
 """
 
 from __future__ import annotations
@@ -11,6 +10,9 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
+
+#: Points that are worked on together.
+BLOCK = 64
 
 
 class MachineArrays(NamedTuple):
@@ -46,455 +48,419 @@ class PointArrays(NamedTuple):
     force: np.ndarray
 
 
-class ArmArrays(NamedTuple):
-    """An arm as the kernel reads it.
+@numba.njit(cache=True, error_model="numpy")
+def coupled_frf(machine, points, parts, slopes):
+    """Fill displacement by each force of both axes' lines, and the slopes that the flange's sensors see; return what is kept of the way.
 
-    mass (c, n, n) at each posture, the sum of G^T G over its bodies (c, b, 6, n); shapes (c, n, 6): what each freedom moves at the flange,
-    t and r in X and in Y, along Z and about it; stiffness, damping (n,).
+    B = Psi^T Z^-1 Psi + R R^T, Z = K - w^2 + i w (L L^T + W G), E = A22 + K_joint^-1 + B; an output of row b (what the flange's sensor
+    sees, the fixture's, or their difference) answers b x with x = E^-1 A21 F.
+
+    Parameters
+    ----------
+    parts : of X and Y, (n, o, 2) each: displacement by the forces in X and in Y [m]; slopes : of both, (n,)
+
+    What is kept, (blocks, rows, 2, BLOCK): real and imaginary parts of Z^-1 Psi by rows, of Z^-T Psi by rows, of x (4) and of each axis'
+    and output's y = E^-T b^T (4).
     """
-
-    mass: np.ndarray
-    bodies: np.ndarray
-    shapes: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-
-
-class SpindleArrays(NamedTuple):
-    """The spindle on a clamped housing: omega_n (m,); psi (m, 4): flange t, r in X and in Y, against the housing; pull (m, 4): what the
-    same motion of the housing pulls a mode with; factor (m, m) lower triangular; residual (4, 4) lower triangular factor; joint (4,): k_t,
-    k_r, c_t, c_r.
-    """
-
-    omega_n: np.ndarray
-    psi: np.ndarray
-    pull: np.ndarray
-    factor: np.ndarray
-    residual: np.ndarray
-    joint: np.ndarray
-
-
-class PosedPoints(NamedTuple):
-    """Points at which a cut's line is asked for: (p,) omega; (p,) posture; (p, 2) places of the line of X and of Y or -1; (p, 6, 6) A22
-    and (p, 6, 3) A21 of the cut's tooling; (p, 3) complex forces in X, Y and Z.
-    """
-
-    omega: np.ndarray
-    posture: np.ndarray
-    place: np.ndarray
-    flange: np.ndarray
-    tip: np.ndarray
-    force: np.ndarray
-
-
-class LineArrays(NamedTuple):
-    """What a kernel fills for one axis: (n, o, f) displacement by each force, X and Y, of a robot Z, too [m]; (n, o, q) its gradient, or
-    (0, o, q); (n, o, 4) v and (n, 4) x, with which a change dB of the flange's receptance moves it by v^T dB x, or (0, o, 4) and (0, 4);
-    (n,) the slope that the flange's sensor sees, or (0,).
-    """
-
-    parts: np.ndarray
-    gradient: np.ndarray
-    felt: np.ndarray
-    moved: np.ndarray
-    turned: np.ndarray
+    omega_n, psi, factor, softening, skew, residual, fixture_residual, joint, seen = machine
+    m, n, outputs = omega_n.size, points.omega.size, parts[0].shape[1]
+    # the fixture's two columns are felt where its motion is an output of its own
+    sides = 6 if outputs == 2 else 4
+    damping = factor @ factor.T
+    static = np.vstack((residual @ residual.T, fixture_residual))
+    # the sheet's rows: Z, Z^-1 Psi, Z^-T Psi, B, E, E^-1 A21, x, an output's b, 1 / K_joint, y
+    right = m * m
+    left = right + m * sides
+    flange = left + m * sides
+    together = flange + 4 * sides
+    carried = together + 16
+    x, b, gives, y = carried + 8, carried + 12, carried + 16, carried + 18
+    sheet = np.zeros((y + 4, 2, BLOCK))
+    kept = np.empty(((n + BLOCK - 1) // BLOCK, 2 * m * sides + 4 + 8 * outputs, 2, BLOCK))
+    for block in range(kept.shape[0]):
+        first = block * BLOCK
+        size = min(BLOCK, n - first)
+        for i in range(m):
+            for j in range(m):
+                row, lost = i * m + j, damping[i, j]
+                turns = skew[i, j] if skew.shape[0] > 0 else 0.0
+                bend = softening[i, j] * omega_n[i] * omega_n[j] if softening.shape[0] > 0 else 0.0
+                square = omega_n[i] ** 2 if i == j else 0.0
+                own = 1.0 if i == j else 0.0
+                for f in range(size):
+                    w = points.omega[first + f]
+                    sheet[row, 0, f] = square - own * w * w + bend * points.x[first + f]
+                for f in range(size):
+                    sheet[row, 1, f] = points.omega[first + f] * (lost + turns * points.speed[first + f])
+            for a in range(sides):
+                _constant(sheet, right + i * sides + a, psi[i, a], size)
+                _constant(sheet, left + i * sides + a, psi[i, a], size)
+        _factorise(sheet, 0, m, size)
+        if skew.shape[0] > 0:
+            _solve_transposed(sheet, 0, m, left, sides, size)
+        _solve(sheet, 0, m, right, sides, size)
+        _keep(sheet, right, kept, block, 0, m * sides, size)
+        # without gyroscopic coupling Z is symmetric
+        _keep(sheet, left if skew.shape[0] > 0 else right, kept, block, m * sides, m * sides, size)
+        for a in range(sides):
+            for c in range(4):
+                _constant(sheet, flange + 4 * a + c, static[a, c], size)
+                for i in range(m):
+                    _add_times(sheet, psi[i, a], right + i * sides + c, flange + 4 * a + c, size)
+        for f in range(size):
+            w = points.omega[first + f]
+            for a in range(2):
+                _put(sheet, gives + a, f, 1.0 / complex(joint[a], w * joint[2 + a]))
+            for a in range(4):
+                for c in range(4):
+                    own = points.flange[first + f, a, c] + (_at(sheet, gives + a % 2, f) if a == c else 0.0)
+                    _put(sheet, together + 4 * a + c, f, own + _at(sheet, flange + 4 * a + c, f))
+                for side in range(2):
+                    _put(sheet, carried + 2 * a + side, f, points.tip[first + f, a, side])
+        _factorise(sheet, together, 4, size)
+        _solve(sheet, together, 4, carried, 2, size)
+        for f in range(size):
+            for a in range(4):
+                for side in range(2):
+                    row = carried + 2 * a + side
+                    _put(sheet, row, f, _at(sheet, row, f) * points.force[first + f, side])
+                _put(sheet, x + a, f, _at(sheet, carried + 2 * a, f) + _at(sheet, carried + 2 * a + 1, f))
+        _keep(sheet, x, kept, block, 2 * m * sides, 4, size)
+        for axis in range(2):
+            behind, front = seen[axis]
+            _constant(sheet, y, 0.0, size)
+            _add_product(sheet, gives + 1, x + 2 * axis + 1, y, size)
+            for part in range(2):
+                for f in range(size):
+                    sheet[y, part, f] *= front
+            for c in range(4):
+                _add_product(sheet, flange + 4 * (2 * axis + 1) + c, x + c, y, size)
+            for f in range(size):
+                place = points.place[first + f, axis]
+                if place >= 0:
+                    slopes[axis][place] = _at(sheet, y, f)
+            for o in range(outputs):
+                for c in range(4):
+                    _constant(sheet, b + c, 0.0, size)
+                    if o == 0:
+                        _add_times(sheet, 1.0, flange + 8 * axis + c, b + c, size)
+                        _add_times(sheet, behind, flange + 8 * axis + 4 + c, b + c, size)
+                    if outputs == 2:
+                        _add_times(sheet, 2.0 * o - 1.0, flange + 16 + 4 * axis + c, b + c, size)
+                if o == 0:
+                    _add_times(sheet, front, gives, b + 2 * axis, size)
+                    _add_times(sheet, front * behind, gives + 1, b + 2 * axis + 1, size)
+                for side in range(2):
+                    _constant(sheet, y, 0.0, size)
+                    for c in range(4):
+                        _add_product(sheet, b + c, carried + 2 * c + side, y, size)
+                    for f in range(size):
+                        place = points.place[first + f, axis]
+                        if place >= 0:
+                            parts[axis][place, o, side] = _at(sheet, y, f)
+                for c in range(4):
+                    for part in range(2):
+                        for f in range(size):
+                            sheet[y + c, part, f] = sheet[b + c, part, f]
+                _solve_transposed(sheet, together, 4, y, 1, size)
+                _keep(sheet, y, kept, block, 2 * m * sides + 4 + 4 * (outputs * axis + o), 4, size)
+    return kept
 
 
 @numba.njit(cache=True, error_model="numpy")
-def factorise(matrix):
-    """Replace a square complex matrix by its factors L U without pivoting; the pivots' inverses stand on the diagonal.
+def coupled_frf_gradient(machine, points, axis, kept, weight, scale, out, pairs):
+    """Fill `out` (q, 2 n o) with the change of an axis' lines with each unknown: real parts, then imaginary parts; and `pairs` with that
+    with skew's entries above the diagonal by rows, where there is any.
+
+    With v = the row's share of the flange - y of `coupled_frf`, p = Z^-T (Psi v + the row's share of the fixture) and q = Z^-1 Psi x:
+    d line = v^T dB x + p^T (dPsi x - dZ q) - y^T dK_joint^-1 x.
+
+    Parameters
+    ----------
+    machine, points, kept : as in `coupled_frf`, which has kept it; axis : 0 or 1
+    weight : (n, o) complex, by which each line's change is multiplied; scale : (q,) by which that with each unknown is
+
+    The rows: log omega_n (m), psi's first four columns by rows (4 m), factor's lower triangle by rows, B's upper triangle by rows (10),
+    with two outputs of X and of Y psi's fixture column (m) and the fixture's residual (4), with softening its lower triangle by rows; and
+    the last four, joint (4).
+    """
+    omega_n, _, factor, softening, skew, _, _, joint, seen = machine
+    m, n, outputs = omega_n.size, points.omega.size, weight.shape[1]
+    sides = 6 if outputs == 2 else 4
+    soft, turns = softening.shape[0] > 0, skew.shape[0] > 0
+    behind, front = seen[axis]
+    # the sheet's rows: what is kept comes first
+    left = m * sides
+    x = 2 * left
+    q = kept.shape[1]
+    lq, kq, p, lp, kp = q + m, q + 2 * m, q + 3 * m, q + 4 * m, q + 5 * m
+    away = q + 6 * m
+    v = away + m
+    y, flexible, share, none, spare = v + 4, v + 8, v + 12, v + 13, v + 14
+    sheet = np.zeros((v + 15, 2, BLOCK))
+    # lines of a block, and where they go
+    own, at = np.empty(BLOCK, dtype=np.intp), np.empty(BLOCK, dtype=np.intp)
+    for block in range(kept.shape[0]):
+        first = block * BLOCK
+        size = min(BLOCK, n - first)
+        for row in range(q):
+            for part in range(2):
+                for f in range(size):
+                    sheet[row, part, f] = kept[block, row, part, f]
+        for i in range(m):
+            _constant(sheet, q + i, 0.0, size)
+            for c in range(4):
+                _add_product(sheet, i * sides + c, x + c, q + i, size)
+        _through(factor, sheet, q, lq, size)
+        _stiffness(omega_n, softening, points, first, sheet, q, kq, size)
+        count = 0
+        for f in range(size):
+            w = points.omega[first + f]
+            for a in range(2):
+                gives = 1.0 / complex(joint[a], w * joint[2 + a])
+                _put(sheet, flexible + a, f, gives * gives)
+                _put(sheet, flexible + 2 + a, f, complex(0.0, w) * gives * gives)
+            if points.place[first + f, axis] >= 0:
+                own[count] = f
+                count += 1
+        for o in range(outputs):
+            flange = 1.0 if o == 0 else 0.0
+            fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
+            for f in range(size):
+                place = points.place[first + f, axis]
+                by = weight[place, o] if place >= 0 else complex(0.0, 0.0)
+                for c in range(4):
+                    answer = _at(sheet, x + 4 + 4 * (outputs * axis + o) + c, f) * by
+                    mine = flange if c == 2 * axis else flange * behind if c == 2 * axis + 1 else 0.0
+                    _put(sheet, v + c, f, mine * by - answer)
+                    # what moves with the holder moves with the joint's own flexibility, too
+                    _put(sheet, y + c, f, answer - front * mine * by)
+                _put(sheet, share, f, fixture * by)
+            for k in range(count):
+                at[k] = points.place[first + own[k], axis] * outputs + o
+            to = own[:count], at[:count], spare
+            for i in range(m):
+                _constant(sheet, p + i, 0.0, size)
+                for c in range(4):
+                    _add_product(sheet, left + i * sides + c, v + c, p + i, size)
+                if outputs == 2:
+                    _add_product(sheet, left + i * sides + 4 + axis, share, p + i, size)
+            _through(factor, sheet, p, lp, size)
+            _stiffness(omega_n, softening, points, first, sheet, p, kp, size)
+            for i in range(m):
+                _line(sheet, (p + i, kq + i, kp + i, q + i), -scale[i], out, i, to, size)
+                for c in range(4):
+                    k = m + 4 * i + c
+                    _line(sheet, (v + c, q + i, p + i, x + c), scale[k], out, k, to, size)
+            k = 5 * m + m * (m + 1) // 2
+            for a in range(4):
+                _line(sheet, (v + a, x + a, none, x), scale[k], out, k, to, size)
+                k += 1
+                for c in range(a + 1, 4):
+                    _line(sheet, (v + a, x + c, v + c, x + a), scale[k], out, k, to, size)
+                    k += 1
+            if outputs == 2:
+                for plane in range(2):
+                    shared = share if plane == axis else none
+                    for i in range(m):
+                        _line(sheet, (shared, q + i, none, x), scale[k], out, k, to, size)
+                        k += 1
+                    for c in range(4):
+                        _line(sheet, (shared, x + c, none, x), scale[k], out, k, to, size)
+                        k += 1
+            if soft:
+                # the omegas' rows are done with it
+                for i in range(m):
+                    for part in range(2):
+                        for f in range(size):
+                            sheet[kp + i, part, f] = points.x[first + f] * sheet[p + i, part, f]
+                for i in range(m):
+                    for j in range(i + 1):
+                        by = -omega_n[i] * omega_n[j] * scale[k] * (0.5 if i == j else 1.0)
+                        _line(sheet, (kp + i, q + j, kp + j, q + i), by, out, k, to, size)
+                        k += 1
+            if turns:
+                # -i w W (p_i q_j - p_j q_i)
+                for i in range(m):
+                    for f in range(size):
+                        turn = points.omega[first + f] * points.speed[first + f]
+                        sheet[kp + i, 0, f] = turn * sheet[p + i, 1, f]
+                        sheet[kp + i, 1, f] = -turn * sheet[p + i, 0, f]
+                    for part in range(2):
+                        for f in range(size):
+                            sheet[away + i, part, f] = -sheet[kp + i, part, f]
+                row = 0
+                for i in range(m):
+                    for j in range(i + 1, m):
+                        _line(sheet, (kp + i, q + j, away + j, q + i), 1.0, pairs, row, to, size)
+                        row += 1
+            k = out.shape[0] - 4
+            for a in range(2):
+                for c in range(2):
+                    _products(sheet, y + c, x + c, y + 2 + c, x + 2 + c, 1.0, kp, size)
+                    _line(sheet, (kp, flexible + 2 * a + c, none, x), scale[k], out, k, to, size)
+                    k += 1
+            # -i w (factor)(factor)^T
+            for i in range(m):
+                for row in (p + i, lp + i):
+                    for f in range(size):
+                        turned = points.omega[first + f] * sheet[row, 1, f]
+                        sheet[row, 1, f] = -points.omega[first + f] * sheet[row, 0, f]
+                        sheet[row, 0, f] = turned
+            k = 5 * m
+            for i in range(m):
+                for j in range(i + 1):
+                    _line(sheet, (p + i, lq + j, lp + j, q + i), scale[k], out, k, to, size)
+                    k += 1
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _factorise(sheet, first, m, size):
+    """Replace complex matrices, by rows from `first` on, by their factors L U without pivoting; the pivots' inverses on the diagonal.
 
     Z / (i omega) has a positive semidefinite Hermitian part: such matrices need no pivoting.
     """
-    m = matrix.shape[0]
     for j in range(m):
-        inverse = 1.0 / matrix[j, j]
-        matrix[j, j] = inverse
+        own = first + j * m + j
+        for f in range(size):
+            real, imag = sheet[own, 0, f], sheet[own, 1, f]
+            inverse = 1.0 / (real * real + imag * imag)
+            sheet[own, 0, f] = real * inverse
+            sheet[own, 1, f] = imag * -inverse
         for i in range(j + 1, m):
-            ratio = matrix[i, j] * inverse
-            matrix[i, j] = ratio
+            ratio = first + i * m + j
+            _multiply(sheet, own, ratio, size)
             for k in range(j + 1, m):
-                matrix[i, k] -= ratio * matrix[j, k]
+                _subtract_product(sheet, ratio, first + j * m + k, first + i * m + k, size)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def solve(factors, right):
-    """Solve L U x = right in place, all columns."""
-    m, columns = right.shape
-    for i in range(m):
-        for k in range(i):
-            ratio = factors[i, k]
-            for c in range(columns):
-                right[i, c] -= ratio * right[k, c]
-    for i in range(m - 1, -1, -1):
-        for k in range(i + 1, m):
-            ratio = factors[i, k]
-            for c in range(columns):
-                right[i, c] -= ratio * right[k, c]
-        inverse = factors[i, i]
-        for c in range(columns):
-            right[i, c] *= inverse
-
-
-@numba.njit(cache=True, error_model="numpy")
-def solve_transposed(factors, right):
-    """Solve (L U)^T x = right in place, all columns."""
-    m, columns = right.shape
-    for i in range(m):
-        inverse = factors[i, i]
-        for c in range(columns):
-            right[i, c] *= inverse
-        for k in range(i + 1, m):
-            ratio = factors[i, k]
-            for c in range(columns):
-                right[k, c] -= ratio * right[i, c]
-    for i in range(m - 1, -1, -1):
-        for k in range(i):
-            ratio = factors[i, k]
-            for c in range(columns):
-                right[k, c] -= ratio * right[i, c]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _through(factor, p, q, lp, lq):
-    """Write L^T p and L^T q of a lower triangular L into `lp` and `lq`."""
-    m = factor.shape[0]
-    for j in range(m):
-        sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
-        for i in range(j, m):
-            sum_p += factor[i, j] * p[i]
-            sum_q += factor[i, j] * q[i]
-        lp[j], lq[j] = sum_p, sum_q
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _lower(row, k, scale, ends, through):
-    """Write the change of scale p^T L L^T q with the lower triangle of L by rows into `row` from k on; return where it ends.
-
-    ends: p and q; through: L^T p and L^T q.
-    """
-    p, q = ends
-    lp, lq = through
-    for i in range(p.size):
-        for j in range(i + 1):
-            row[k] = scale * (p[i] * lq[j] + lp[j] * q[i])
-            k += 1
-    return k
-
-
-@numba.njit(cache=True, error_model="numpy")
-def coupled_lines(machine, points, lines_x, lines_y):
-    """Fill the lines of both axes: displacement of flange, or of gap and fixture, per force in X and in Y, and its gradient.
-
-    B = Psi^T Z^-1 Psi + R R^T, Z = K - w^2 + i w (L L^T + W G), E = A22 + K_joint^-1 + B; an output of row b (what the flange's sensor
-    sees, the fixture's, or their difference) answers b x with x = E^-1 A21 F. With y = E^-T b^T, v = the row's share of the flange - y
-    and p = Z^-T (Psi v + the row's share of the fixture), q = Z^-1 Psi x: d line = v^T dB x + p^T (dPsi x - dZ q) - y^T dK_joint^-1 x.
-
-    The gradient's columns: log omega_n (m), psi's first four columns by rows (4 m), factor's lower triangle by rows, residual's lower
-    triangle by rows (10), with two outputs of X and of Y psi's fixture column (m) and the fixture's residual (4), with softening its
-    lower triangle by rows, with skew its entries above the diagonal by rows, joint (4).
-    """
-    omega_n, psi, factor, softening, skew, residual, fixture_residual, joint, seen = machine
-    m = omega_n.size
-    linear = lines_x.gradient.shape[0] > 0 or lines_y.gradient.shape[0] > 0
-    # the fixture's two columns are felt where its motion is an output of its own
-    sides = 6 if lines_x.parts.shape[1] == 2 else 4
-    soft, turns = softening.shape[0] > 0, skew.shape[0] > 0
-    damping = factor @ factor.T
-    static = residual @ residual.T
-    stiffness = np.zeros((m, m))
-    dynamic = np.empty((m, m), dtype=np.complex128)
-    right = np.empty((m, sides), dtype=np.complex128)
-    left = np.empty((m, sides), dtype=np.complex128)
-    block = np.zeros((6, 4), dtype=np.complex128)
-    together = np.empty((4, 4), dtype=np.complex128)
-    carried = np.empty((4, 2), dtype=np.complex128)
-    x, v, b, rx, rv = np.empty((5, 4), dtype=np.complex128)
-    column = np.empty((4, 1), dtype=np.complex128)
-    y = column[:, 0]
-    p, q, lp, lq, kp, kq = np.empty((6, m), dtype=np.complex128)
-    for f in range(points.omega.size):
-        w, relative, speed = points.omega[f], points.x[f], points.speed[f]
+def _solve(sheet, first, m, right, columns, size):
+    """Solve L U x = right in place; all columns stand by rows from `right` on."""
+    for c in range(columns):
         for i in range(m):
-            for j in range(m):
-                k_ij = omega_n[i] ** 2 if i == j else 0.0
-                if soft:
-                    k_ij += relative * softening[i, j] * omega_n[i] * omega_n[j]
-                stiffness[i, j] = k_ij
-                d_ij = damping[i, j]
-                if turns:
-                    d_ij += speed * skew[i, j]
-                dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * d_ij)
-        right[:] = psi[:, :sides]
-        factorise(dynamic)
-        if turns and linear:
-            left[:] = right
-            solve_transposed(dynamic, left)
-        solve(dynamic, right)
-        # without gyroscopic coupling Z is symmetric
-        back = left if turns else right
-        for a in range(sides):
-            for c in range(4):
-                total = complex(static[a, c], 0.0) if a < 4 else complex(fixture_residual[a - 4, c], 0.0)
-                for i in range(m):
-                    total += psi[i, a] * right[i, c]
-                block[a, c] = total
-        k_t, k_r = 1.0 / complex(joint[0], w * joint[2]), 1.0 / complex(joint[1], w * joint[3])
-        together[:] = points.flange[f] + block[:4]
-        for a in range(4):
-            together[a, a] += k_t if a % 2 == 0 else k_r
-        factorise(together)
-        carried[:] = points.tip[f]
-        solve(together, carried)
-        x[:] = carried[:, 0] * points.force[f, 0] + carried[:, 1] * points.force[f, 1]
-        for i in range(m):
-            total = complex(0.0, 0.0)
-            for c in range(4):
-                total += right[i, c] * x[c]
-            q[i] = total
-        for axis in range(2):
-            row_number = points.place[f, axis]
-            if row_number < 0:
-                continue
-            parts = lines_x.parts if axis == 0 else lines_y.parts
-            gradient = lines_x.gradient if axis == 0 else lines_y.gradient
-            felt = lines_x.felt if axis == 0 else lines_y.felt
-            moved = lines_x.moved if axis == 0 else lines_y.moved
-            outputs = parts.shape[1]
-            behind, front = seen[axis]
-            if gradient.shape[0] > 0:
-                slope = front * k_r * x[2 * axis + 1] + np.sum(block[2 * axis + 1] * x)
-                (lines_x if axis == 0 else lines_y).turned[row_number] = slope
-            for o in range(outputs):
-                # share of flange and fixture in the output
-                flange = 1.0 if o == 0 else 0.0
-                fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
-                for c in range(4):
-                    b[c] = flange * (block[2 * axis, c] + behind * block[2 * axis + 1, c]) + fixture * block[4 + axis, c]
-                b[2 * axis] += flange * front * k_t
-                b[2 * axis + 1] += flange * front * behind * k_r
-                for side in range(2):
-                    total = complex(0.0, 0.0)
-                    for c in range(4):
-                        total += b[c] * carried[c, side]
-                    parts[row_number, o, side] = total * points.force[f, side]
-                if gradient.shape[0] == 0:
-                    continue
-                y[:] = b
-                solve_transposed(together, column)
-                v[:] = -y
-                v[2 * axis] += flange
-                v[2 * axis + 1] += flange * behind
-                felt[row_number, o, :] = v
-                moved[row_number, :] = x
-                for i in range(m):
-                    total = complex(0.0, 0.0)
-                    for c in range(4):
-                        total += back[i, c] * v[c]
-                    if outputs == 2:
-                        total += fixture * back[i, 4 + axis]
-                    p[i] = total
-                _through(factor, p, q, lp, lq)
-                for i in range(m):
-                    sum_p, sum_q = stiffness[i, i] * p[i], stiffness[i, i] * q[i]
-                    if soft:
-                        sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
-                        for j in range(m):
-                            sum_p += stiffness[i, j] * p[j]
-                            sum_q += stiffness[i, j] * q[j]
-                    kp[i], kq[i] = sum_p, sum_q
-                _through(residual, v, x, rv, rx)
-                row = gradient[row_number, o]
-                k = m
-                for i in range(m):
-                    row[i] = -p[i] * kq[i] - kp[i] * q[i]
-                    for c in range(4):
-                        row[k] = v[c] * q[i] + p[i] * x[c]
-                        k += 1
-                k = _lower(row, k, complex(0.0, -w), (p, q), (lp, lq))
-                k = _lower(row, k, complex(1.0, 0.0), (v[:4], x[:4]), (rv, rx))
-                if outputs == 2:
-                    for place in range(2):
-                        share = fixture if place == axis else 0.0
-                        for i in range(m):
-                            row[k] = share * q[i]
-                            k += 1
-                        for c in range(4):
-                            row[k] = share * x[c]
-                            k += 1
-                if soft:
-                    for i in range(m):
-                        scale = -relative * omega_n[i]
-                        for j in range(i):
-                            row[k] = scale * omega_n[j] * (p[i] * q[j] + p[j] * q[i])
-                            k += 1
-                        row[k] = scale * omega_n[i] * p[i] * q[i]
-                        k += 1
-                if turns:
-                    turn = complex(0.0, -w * speed)
-                    for i in range(m):
-                        for j in range(i + 1, m):
-                            row[k] = turn * (p[i] * q[j] - p[j] * q[i])
-                            k += 1
-                y[2 * axis] -= flange * front  # what moves with the holder moves with the joint's own flexibility
-                y[2 * axis + 1] -= flange * front * behind
-                row[k] = (y[0] * x[0] + y[2] * x[2]) * k_t * k_t
-                row[k + 1] = (y[1] * x[1] + y[3] * x[3]) * k_r * k_r
-                row[k + 2] = complex(0.0, w) * row[k]
-                row[k + 3] = complex(0.0, w) * row[k + 1]
+            for k in range(i):
+                _subtract_product(sheet, first + i * m + k, right + k * columns + c, right + i * columns + c, size)
+        for i in range(m - 1, -1, -1):
+            for k in range(i + 1, m):
+                _subtract_product(sheet, first + i * m + k, right + k * columns + c, right + i * columns + c, size)
+            _multiply(sheet, first + i * m + i, right + i * columns + c, size)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def posed_lines(arm, spindle, points, lines_x, lines_y):
-    """Fill the lines of both axes: displacement of flange, or of gap and fixture, by each force, and its gradient.
-
-    Arm and spindle are one system of n + m freedoms, Z = K - w^2 M + i w C with M = [[M(q), S P^T], [P S^T, 1]], C = [[C, 0], [0, L L^T]].
-    The housing moves as S^T q, the flange as T^T = [S; Psi]^T of all of them, and gives way by R R^T more. With B = T^T Z^-1 T + R R^T and
-    E = A22 + K_joint^-1 + B over six directions, an output of row b answers b x with x = E^-1 A21 F. With y = E^-T b^T, v = the row's share
-    of the flange - y, p = Z^-1 (T v + the row's share of the housing), q = Z^-1 T x:
-    d line = v^T dB x + p^T (dT x - dZ q) + v^T dT^T q - y^T dK_joint^-1 x.
-
-    The gradient's columns: stiffness (n), damping (n), logarithms of the bodies' masses (b), log omega_n (m), psi by rows (4 m), pull by
-    rows (4 m), factor's lower triangle by rows, residual's lower triangle by rows (10), joint (4).
-    """
-    omega_n, psi, pull, factor, residual, joint = spindle
-    n, m, bodies = arm.stiffness.size, omega_n.size, arm.bodies.shape[1]
-    linear = lines_x.gradient.shape[0] > 0 or lines_y.gradient.shape[0] > 0
-    outputs = lines_x.parts.shape[1]
-    damping = factor @ factor.T
-    static = residual @ residual.T
-    dynamic = np.empty((n + m, n + m), dtype=np.complex128)
-    # what moves the flange's six directions, and behind them the housing along X and Y
-    seen = np.zeros((n + m, 8))
-    right = np.empty((n + m, 8), dtype=np.complex128)
-    block = np.empty((8, 6), dtype=np.complex128)
-    together = np.empty((6, 6), dtype=np.complex128)
-    carried = np.empty((6, 3), dtype=np.complex128)
-    x, v, b = np.empty((3, 6), dtype=np.complex128)
-    rx, rv, hp, hq = np.empty((4, 4), dtype=np.complex128)
-    column = np.empty((6, 1), dtype=np.complex128)
-    y = column[:, 0]
-    p, q = np.empty((2, n + m), dtype=np.complex128)
-    lp, lq = np.empty((2, m), dtype=np.complex128)
-    swung = np.empty((bodies, 6), dtype=np.complex128)
-    seen[n:, :4] = psi
-    for f in range(points.omega.size):
-        w, c = points.omega[f], points.posture[f]
-        shapes = arm.shapes[c]
-        for i in range(n):
-            for j in range(n):
-                dynamic[i, j] = complex(-w * w * arm.mass[c, i, j], 0.0)
-            dynamic[i, i] += complex(arm.stiffness[i], w * arm.damping[i])
-            for a in range(6):
-                seen[i, a] = shapes[i, a]
-            seen[i, 6], seen[i, 7] = shapes[i, 0], shapes[i, 2]
-            for j in range(m):
-                pulled = 0.0
-                for d in range(4):
-                    pulled += shapes[i, d] * pull[j, d]
-                dynamic[i, n + j] = dynamic[n + j, i] = complex(-w * w * pulled, 0.0)
+def _solve_transposed(sheet, first, m, right, columns, size):
+    """Solve (L U)^T x = right in the same way."""
+    for c in range(columns):
         for i in range(m):
-            for j in range(m):
-                dynamic[n + i, n + j] = complex(omega_n[i] ** 2 - w * w if i == j else 0.0, w * damping[i, j])
-        right[:] = seen
-        factorise(dynamic)
-        solve(dynamic, right)
-        for a in range(8):
-            for d in range(6):
-                total = complex(static[a, d] if a < 4 and d < 4 else 0.0, 0.0)
-                for i in range(n + m if a < 6 else n):
-                    total += seen[i, a] * right[i, d]
-                block[a, d] = total
-        k_t, k_r = 1.0 / complex(joint[0], w * joint[2]), 1.0 / complex(joint[1], w * joint[3])
-        for a in range(6):
-            for d in range(6):
-                together[a, d] = points.flange[f, a, d] + block[a, d]
-            together[a, a] += k_t if a % 2 == 0 else k_r
-            for d in range(3):
-                carried[a, d] = points.tip[f, a, d]
-        factorise(together)
-        solve(together, carried)
-        for a in range(6):
-            x[a] = carried[a, 0] * points.force[f, 0] + carried[a, 1] * points.force[f, 1] + carried[a, 2] * points.force[f, 2]
-        for i in range(n + m):
-            total = complex(0.0, 0.0)
-            for d in range(6):
-                total += right[i, d] * x[d]
-            q[i] = total
-        if linear:
-            for k in range(bodies):
-                for d in range(6):
-                    total = complex(0.0, 0.0)
-                    for i in range(n):
-                        total += arm.bodies[c, k, d, i] * q[i]
-                    swung[k, d] = w * w * total
-        for axis in range(2):
-            place = points.place[f, axis]
-            if place < 0:
-                continue
-            parts = lines_x.parts if axis == 0 else lines_y.parts
-            gradient = lines_x.gradient if axis == 0 else lines_y.gradient
-            felt = lines_x.felt if axis == 0 else lines_y.felt
-            moved = lines_x.moved if axis == 0 else lines_y.moved
-            for o in range(outputs):
-                # share of flange and fixture in the output
-                flange = 1.0 if o == 0 else 0.0
-                fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
-                for d in range(6):
-                    b[d] = flange * block[2 * axis, d] + fixture * block[6 + axis, d]
-                for side in range(3):
-                    total = complex(0.0, 0.0)
-                    for d in range(6):
-                        total += b[d] * carried[d, side]
-                    parts[place, o, side] = total * points.force[f, side]
-                if not linear:
-                    continue
-                y[:] = b
-                solve_transposed(together, column)
-                v[:] = -y
-                v[2 * axis] += flange
-                for d in range(4):
-                    felt[place, o, d] = v[d]
-                    moved[place, d] = x[d]
-                for i in range(n + m):
-                    total = fixture * right[i, 6 + axis]
-                    for d in range(6):
-                        total += right[i, d] * v[d]
-                    p[i] = total
-                row = gradient[place, o]
-                for i in range(n):
-                    row[i] = -p[i] * q[i]
-                    row[n + i] = complex(0.0, w) * row[i]
-                for d in range(4):
-                    sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
-                    for i in range(n):
-                        sum_p += shapes[i, d] * p[i]
-                        sum_q += shapes[i, d] * q[i]
-                    hp[d], hq[d] = w * w * sum_p, w * w * sum_q
-                _through(factor, p[n:], q[n:], lp, lq)
-                _through(residual, v, x, rv, rx)
-                k = 2 * n
-                for body in range(bodies):
-                    total = complex(0.0, 0.0)
-                    for d in range(6):
-                        own = complex(0.0, 0.0)
-                        for i in range(n):
-                            own += arm.bodies[c, body, d, i] * p[i]
-                        total += own * swung[body, d]
-                    row[k] = total
-                    k += 1
-                for i in range(m):
-                    row[k] = -2.0 * omega_n[i] ** 2 * p[n + i] * q[n + i]
-                    k += 1
-                for i in range(m):
-                    for d in range(4):
-                        row[k] = v[d] * q[n + i] + p[n + i] * x[d]
-                        row[k + 4 * m] = hp[d] * q[n + i] + p[n + i] * hq[d]
-                        k += 1
-                k += 4 * m
-                k = _lower(row, k, complex(0.0, -w), (p[n:], q[n:]), (lp, lq))
-                k = _lower(row, k, complex(1.0, 0.0), (v[:4], x[:4]), (rv, rx))
-                row[k] = (y[0] * x[0] + y[2] * x[2] + y[4] * x[4]) * k_t * k_t
-                row[k + 1] = (y[1] * x[1] + y[3] * x[3] + y[5] * x[5]) * k_r * k_r
-                row[k + 2] = complex(0.0, w) * row[k]
-                row[k + 3] = complex(0.0, w) * row[k + 1]
+            for k in range(i):
+                _subtract_product(sheet, first + k * m + i, right + k * columns + c, right + i * columns + c, size)
+            _multiply(sheet, first + i * m + i, right + i * columns + c, size)
+        for i in range(m - 1, -1, -1):
+            for k in range(i + 1, m):
+                _subtract_product(sheet, first + k * m + i, right + k * columns + c, right + i * columns + c, size)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _constant(sheet, row, value, size):
+    for f in range(size):
+        sheet[row, 0, f] = value
+        sheet[row, 1, f] = 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _keep(sheet, row, kept, block, to, count, size):
+    for i in range(count):
+        for part in range(2):
+            for f in range(size):
+                kept[block, to + i, part, f] = sheet[row + i, part, f]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _add_times(sheet, share, a, row, size):
+    for part in range(2):
+        for f in range(size):
+            sheet[row, part, f] += share * sheet[a, part, f]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _multiply(sheet, a, row, size):
+    for f in range(size):
+        real = sheet[row, 0, f] * sheet[a, 0, f] - sheet[row, 1, f] * sheet[a, 1, f]
+        sheet[row, 1, f] = sheet[row, 0, f] * sheet[a, 1, f] + sheet[row, 1, f] * sheet[a, 0, f]
+        sheet[row, 0, f] = real
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _subtract_product(sheet, a, b, row, size):
+    for f in range(size):
+        sheet[row, 0, f] -= sheet[a, 0, f] * sheet[b, 0, f] - sheet[a, 1, f] * sheet[b, 1, f]
+    for f in range(size):
+        sheet[row, 1, f] -= sheet[a, 0, f] * sheet[b, 1, f] + sheet[a, 1, f] * sheet[b, 0, f]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _add_product(sheet, a, b, row, size):
+    for f in range(size):
+        sheet[row, 0, f] += sheet[a, 0, f] * sheet[b, 0, f] - sheet[a, 1, f] * sheet[b, 1, f]
+    for f in range(size):
+        sheet[row, 1, f] += sheet[a, 0, f] * sheet[b, 1, f] + sheet[a, 1, f] * sheet[b, 0, f]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _products(sheet, a, b, c, d, scale, row, size):
+    """Fill a row with scale (a b + c d)."""
+    for f in range(size):
+        first = sheet[a, 0, f] * sheet[b, 0, f] - sheet[a, 1, f] * sheet[b, 1, f]
+        sheet[row, 0, f] = scale * (first + sheet[c, 0, f] * sheet[d, 0, f] - sheet[c, 1, f] * sheet[d, 1, f])
+    for f in range(size):
+        first = sheet[a, 0, f] * sheet[b, 1, f] + sheet[a, 1, f] * sheet[b, 0, f]
+        sheet[row, 1, f] = scale * (first + sheet[c, 0, f] * sheet[d, 1, f] + sheet[c, 1, f] * sheet[d, 0, f])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _line(sheet, rows, scale, out, line, to, size):
+    """Fill a row of `out` with scale (a b + c d), and the imaginary parts half of it further.
+
+    `rows`: numbers of a, b, c and d; `to`: points that count, their places, and a row of the sheet that is free
+    """
+    a, b, c, d = rows
+    own, at, spare = to
+    half = out.shape[1] // 2
+    _products(sheet, a, b, c, d, scale, spare, size)
+    for k in range(own.size):
+        out[line, at[k]] = sheet[spare, 0, own[k]]
+    for k in range(own.size):
+        out[line, half + at[k]] = sheet[spare, 1, own[k]]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _through(factor, sheet, rows, to, size):
+    """Rows from `to` on = factor^T times those from `rows` on, of a lower triangular one."""
+    for j in range(factor.shape[0]):
+        _constant(sheet, to + j, 0.0, size)
+        for i in range(j, factor.shape[0]):
+            _add_times(sheet, factor[i, j], rows + i, to + j, size)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _stiffness(omega_n, softening, points, first, sheet, rows, to, size):
+    """Rows from `to` on = K times those from `rows` on."""
+    for i in range(omega_n.size):
+        _constant(sheet, to + i, 0.0, size)
+        if softening.shape[0] > 0:
+            for j in range(omega_n.size):
+                _add_times(sheet, softening[i, j] * omega_n[i] * omega_n[j], rows + j, to + i, size)
+        square = omega_n[i] ** 2
+        for part in range(2):
+            for f in range(size):
+                sheet[to + i, part, f] = points.x[first + f] * sheet[to + i, part, f] + square * sheet[rows + i, part, f]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _at(sheet, row, f):
+    return complex(sheet[row, 0, f], sheet[row, 1, f])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _put(sheet, row, f, z):
+    sheet[row, 0, f], sheet[row, 1, f] = z.real, z.imag

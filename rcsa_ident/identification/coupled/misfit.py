@@ -1,22 +1,21 @@
-"""Misfit where each line is moved by the forces along several axes: of both planes together, and what a robot's has in common with it."""
+"""Misfit of both planes together: each line is moved by the forces along X and Y."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.base.arrays import ComplexArray, FloatArray
-from rcsa_ident.identification._kernels.lines import whiten
-from rcsa_ident.identification.coupled._kernels import LineArrays, MachineArrays, PointArrays, coupled_lines
+from rcsa_ident.identification.coupled._kernels import MachineArrays, PointArrays, coupled_frf, coupled_frf_gradient
 from rcsa_ident.identification.coupled.data import CoupledData, coupled_data
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines
+from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines, complex_columns
+from rcsa_ident.identification.modal_parameters import ModalParameters, residual_turn
 from rcsa_ident.identification.priors import Priors
-from rcsa_ident.identification.unknowns import DIRECTIONS, JOINT, CoupledLayout, ModalBlock, Unknowns, chain, scaled_joint, unpack
+from rcsa_ident.identification.unknowns import JOINT, RESIDUAL_UNIT, CoupledLayout, ModalBlock, Unknowns, chain, scaled_joint, unpack
 
 
 class Points(Protocol):
@@ -43,71 +42,16 @@ class Points(Protocol):
         ...
 
 
-class SharedMisfit(Misfit):
-    """The residual where one machine answers the forces along all axes. `priors`, `model_error`, `cut_weight`: as in `Misfit`."""
+class CoupledMisfit(Misfit):
+    """The residual of an identification in which both planes feel each other.
 
-    def __init__(self, data: Points, priors: Priors, model_error: tuple[float, ...], cut_weight: FloatArray | None = None) -> None:
+    `data`: points of both axes
+    `priors`, `model_error`, `cut_weight`: as in `Misfit`
+    """
+
+    def __init__(self, data: CoupledData, priors: Priors, model_error: tuple[float, ...], cut_weight: FloatArray | None = None) -> None:
         super().__init__(data.base, priors, model_error, cut_weight)
         self.points_data = data
-
-    @abstractmethod
-    def _fill(self, theta: FloatArray, layout: Unknowns, force: ComplexArray, lines: Sequence[LineArrays]) -> None:
-        """Have a kernel fill the lines of both axes."""
-
-    @abstractmethod
-    def _turned(self, gradient: ComplexArray, theta: FloatArray, layout: Unknowns) -> tuple[ComplexArray, FloatArray]:
-        """A gradient in the vector's columns, shape (n, o, q), and the vector's own units, shape (q,)."""
-
-    def _columns(self, layout: Unknowns) -> int:
-        """Number of columns of the kernel's gradient."""
-        return layout.tail + JOINT
-
-    def _answers(self, theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
-        return self._answered(theta, layout, False)
-
-    def _with_slopes(self, answers: Sequence[Answer], theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
-        return self._answered(theta, layout, True)
-
-    def _answered(self, theta: FloatArray, layout: Unknowns, normal: bool) -> Sequence[Answer]:
-        data, named, coefficients = self.points_data, len(self.data.coefficients), theta[layout.force]
-        force = data.force * np.exp(data.slope[:, :, : min(named, coefficients.size)] @ coefficients[:named])
-        lines = [self._room(axis, layout, normal) for axis in self._axes]
-        self._fill(theta, layout, force, lines)
-        answers = []
-        for i, (axis, found) in enumerate(zip(self.data.axes, lines, strict=True)):
-            own = np.flatnonzero(data.place[:, i] >= 0)
-            at = np.empty(own.size, dtype=np.intp)
-            at[data.place[own, i]] = own
-            # smooth errors are those of the axis' own lines, whichever force has moved them
-            smooth = axis.force_slope[:, named : layout.coefficients]
-            factor = np.exp(smooth @ coefficients[named:]) / axis.force
-            parts = found.parts * factor[:, None, None]
-            model = parts.sum(axis=2)
-            if not normal:
-                answers.append(_SharedAnswer(model))
-                continue
-            found.gradient[:] *= factor[:, None, None]
-            change = np.einsum("nos,nsc->noc", parts, data.slope[at][:, :, : min(named, layout.coefficients)])
-            extra = np.concatenate([change, model[:, :, None] * smooth[:, None, :]], axis=2)
-            place = self.distance_place(i, layout)
-            if place is not None:
-                extra[:, 0, place] = found.turned * factor
-            gradient, scale = self._turned(found.gradient, theta, layout)
-            answers.append(_SharedAnswer(model, gradient, extra, compliance_of(found.felt, found.moved, factor), scale))
-        return answers
-
-    def _room(self, axis: WeightedLines, layout: Unknowns, normal: bool) -> LineArrays:
-        """Room for what the kernel says of an axis' lines."""
-        n, o, forces = axis.points.shape[0], axis.outputs, self.points_data.force.shape[1]
-        rows = n if normal else 0
-        shapes = (n, o, forces), (rows, o, self._columns(layout)), (rows, o, DIRECTIONS), (rows, DIRECTIONS), (rows,)
-        return LineArrays(*(np.empty(shape, dtype=complex) for shape in shapes))
-
-
-class CoupledMisfit(SharedMisfit):
-    """The residual of an identification in which both planes feel each other; parameters as in `SharedMisfit`, of `CoupledData`."""
-
-    points_data: CoupledData
 
     def with_cut_weight(self, weight: FloatArray) -> CoupledMisfit:
         """Return the misfit of the same data with other factors on the weights of the cuts' lines, shape (k,)."""
@@ -117,30 +61,64 @@ class CoupledMisfit(SharedMisfit):
         """Return the misfit of other data of the same machine, with factors on the weights of its cuts' lines, shape (k,)."""
         return CoupledMisfit(coupled_data(data), self.priors, self.model_error if error is None else error, weight)
 
-    def _columns(self, layout: Unknowns) -> int:
-        block = _block(layout)
-        return block.parts["skew"].start + JOINT + (block.modes * (block.modes - 1) // 2 if block.skew else 0)
-
-    def _fill(self, theta: FloatArray, layout: Unknowns, force: ComplexArray, lines: Sequence[LineArrays]) -> None:
+    def _answers(self, theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
         assert isinstance(layout, CoupledLayout)
         data, machine, turning = self.points_data, unpack(theta, layout.block), layout.turning
+        forces = Forces(data, theta[layout.force])
         shapes, residual = np.hstack([machine.psi, machine.places]), (machine.residual, machine.place_residual)
         seen = np.stack([self.seen_at(i, theta, layout) for i in range(2)])
-        coupled_lines(
-            MachineArrays(
-                machine.omega_n, shapes, machine.factor, machine.softening, machine.skew, *residual, scaled_joint(theta[layout.joint]), seen
-            ),
-            PointArrays(data.omega, data.relative_speed, data.speed, data.place, data.flange[turning], data.tip[turning], force),
-            *lines,
+        joint = scaled_joint(theta[layout.joint])
+        arrays = MachineArrays(machine.omega_n, shapes, machine.factor, machine.softening, machine.skew, *residual, joint, seen)
+        points = PointArrays(
+            data.omega, data.relative_speed, data.speed, data.place, data.flange[turning], data.tip[turning], forces.of_points
         )
+        parts = tuple(np.empty((*axis.points.shape[:1], axis.outputs, 2), dtype=complex) for axis in self._axes)
+        slopes = tuple(np.empty(each.shape[0], dtype=complex) for each in parts)
+        kept = coupled_frf(arrays, points, parts, slopes)
+        physics = _Both(machine, layout.block, theta, joint, arrays, points, kept)
+        answers = []
+        for i, (moved, slope) in enumerate(zip(parts, slopes, strict=True)):
+            factor = forces.factor(i)
+            own = moved * factor[:, None, None]
+            answers.append(_CoupledAnswer(own.sum(axis=2), i, factor, own, slope * factor, self.distance_place(i, layout), forces, physics))
+        return answers
 
-    def _turned(self, gradient: ComplexArray, theta: FloatArray, layout: Unknowns) -> tuple[ComplexArray, FloatArray]:
-        block = _block(layout)
-        if block.skew:
-            first = block.parts["skew"].start
-            skew = gradient[:, :, first:-JOINT] @ block.skew_chain(theta)
-            gradient = np.concatenate([gradient[:, :, :first], skew, gradient[:, :, -JOINT:]], axis=2)
-        return gradient, np.concatenate([chain(unpack(theta, block), block), scaled_joint(theta[layout.joint])])
+    def _with_slopes(self, answers: Sequence[Answer], theta: FloatArray, layout: Unknowns) -> Sequence[Answer]:
+        del theta, layout
+        return answers
+
+
+class Forces:
+    """What the forces of a campaign's points are of those that were simulated.
+
+    `data`: of points
+    `logs`, shape (c,): logarithms of the coefficients' scales, and behind them the smooth errors of each axis' own lines
+    """
+
+    def __init__(self, data: Points, logs: FloatArray) -> None:
+        self.data, self.logs = data, logs
+        self.named = min(len(data.base.coefficients), logs.size)
+        #: Shape (p, f) [N].
+        self.of_points: ComplexArray = data.force * np.exp(data.slope[:, :, : self.named] @ logs[: self.named])
+
+    def factor(self, axis: int) -> ComplexArray:
+        """Return the factor on the displacement of an axis' lines that makes cross FRFs of it, shape (n,) [1/N]."""
+        lines = self.data.base.axes[axis]
+        found: ComplexArray = np.exp(self._smooth(axis) @ self.logs[self.named :]) / lines.force
+        return found
+
+    def slopes(self, axis: int, parts: ComplexArray) -> ComplexArray:
+        """Return how an axis' lines change with each of the unknowns. `parts`: by each force, shape (n, o, f). Shape (n, o, c)."""
+        place = self.data.place[:, axis]
+        own = np.flatnonzero(place >= 0)
+        at = np.empty(own.size, dtype=np.intp)
+        at[place[own]] = own
+        change = np.einsum("nos,nsc->noc", parts, self.data.slope[at][:, :, : self.named])
+        return np.concatenate([change, parts.sum(axis=2)[:, :, None] * self._smooth(axis)[:, None, :]], axis=2)
+
+    def _smooth(self, axis: int) -> ComplexArray:
+        # smooth errors are those of the axis' own lines, whichever force has moved them
+        return self.data.base.axes[axis].force_slope[:, len(self.data.base.coefficients) : self.logs.size]
 
 
 def _block(layout: Unknowns) -> ModalBlock:
@@ -148,33 +126,59 @@ def _block(layout: Unknowns) -> ModalBlock:
     return layout.block
 
 
-def compliance_of(felt: ComplexArray, moved: ComplexArray, factor: ComplexArray) -> ComplexArray:
-    """Return the lines' change with the flange's symmetric receptance, its upper triangle by rows, shape (n, o, 10).
+@dataclass(frozen=True, slots=True, eq=False)
+class _Both:
+    """What both axes' lines are made of: the machine, its vector, and what the kernel took and kept."""
 
-    `felt`, `moved`: complex arrays, shapes (n, o, 4), (n, 4); v and x of a line's change v^T dB x
-    `factor`, shape (n,): on each line
-    """
-    rows, cols = np.triu_indices(DIRECTIONS)
-    both = felt[:, :, :, None] * moved[:, None, None, :]
-    found: ComplexArray = both[:, :, rows, cols] + np.where(rows != cols, both[:, :, cols, rows], 0.0)
-    return found * factor[:, None, None]
+    machine: ModalParameters
+    block: ModalBlock
+    theta: FloatArray
+    joint: FloatArray
+    arrays: MachineArrays
+    points: PointArrays
+    kept: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _SharedAnswer:
-    """One axis' lines; where they are asked for, their gradients in the kernel's units with the vector's own."""
+class _CoupledAnswer:
+    """One axis' lines, and what their gradient is made of.
+
+    `parts`, shape (n, o, 2): by each force
+    `turned`, shape (n,): how they change with the slope that the flange's sensor sees
+    `place`: where what is not known of its distance stands among the coefficients
+    """
 
     model: ComplexArray
-    gradient: ComplexArray = field(default_factory=lambda: np.empty((0, 0, 0), dtype=complex))
-    extra: ComplexArray = field(default_factory=lambda: np.empty((0, 0, 0), dtype=complex))
-    compliance: ComplexArray = field(default_factory=lambda: np.empty((0, 0, 0), dtype=complex))
-    scale: FloatArray = field(default_factory=lambda: np.empty(0))
+    axis: int
+    factor: ComplexArray
+    parts: ComplexArray
+    turned: ComplexArray
+    place: int | None
+    forces: Forces
+    both: _Both
 
     def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
         """As in `Answer`; the flange's receptance in both bending planes is asked for its upper triangle by rows, shape (n o, 10)."""
-        del layout
-        rows = self.gradient.reshape(-1, self.gradient.shape[2])
-        extra = self.extra.reshape(rows.shape[0], -1)
-        out = np.empty((rows.shape[1] + extra.shape[1], 2 * rows.shape[0]))
-        whiten(rows, extra, lines.weight, self.scale, out)
-        return out, self.compliance.reshape(rows.shape[0], -1) * -lines.root[:, None]
+        both, block = self.both, self.both.block
+        n, o = self.model.shape
+        bare, skew = block.parts["residual"], block.parts["skew"]
+        own = block.size + JOINT
+        root = -lines.root.reshape(n, o)
+        scale = np.concatenate([chain(both.machine, block), both.joint])
+        # first as it changes with the flange's receptance itself
+        scale[bare] = 1.0
+        out = np.empty((own + layout.coefficients, 2 * n * o))
+        turns = block.skew_chain(both.theta) if block.skew else np.empty((0, 0))
+        pairs = np.empty((turns.shape[0], 2 * n * o))
+        weight = root * self.factor[:, None]
+        coupled_frf_gradient(both.arrays, both.points, self.axis, both.kept, weight, scale, out[:own], pairs)
+        if block.skew:
+            np.matmul(turns.T, pairs, out=out[skew])
+        compliance = complex_columns(out[bare])
+        out[bare] = (RESIDUAL_UNIT * residual_turn(both.machine.residual)).T @ out[bare]
+        change = self.forces.slopes(self.axis, self.parts)
+        if self.place is not None:
+            change[:, 0, self.place] = self.turned
+        change = (change * root[:, :, None]).reshape(n * o, -1).T
+        out[own:, : n * o], out[own:, n * o :] = change.real, change.imag
+        return out, compliance
