@@ -40,6 +40,7 @@ STUDIES = (
     "identification",
     "ideals",
     "listening",
+    "limits",
     "search_trace",
     "lobes_truth",
     "slow_spindle",

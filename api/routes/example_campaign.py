@@ -14,12 +14,12 @@ from api.conventions import guard, in_use, problems
 from api.problems import Problem
 from api.reading.example_campaign import ABOUT, LARGEST, MACHINE, example_id, example_tooling
 from api.routes.machines import contents_of, unseen
-from api.routes.toolings import summary
 from api.schemas.libraries import ExampleCampaign
 from api.security import Caller, Guarded, WhoAsks, now
 from api.stores.campaigns import Campaign
 from api.stores.entities import ABSENT, Document, Machine, Stale, Taken, digest_of
 from api.transfer.body_stream import check_room
+from api.work.toolings import summary
 from rcsa_ident.base.remarks import counted
 
 router = APIRouter(prefix="/examples/campaign", tags=["examples"], route_class=Guarded)

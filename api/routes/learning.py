@@ -14,7 +14,6 @@ from api.conventions import CampaignId, Why, expected, guard, problems, tagged, 
 from api.lookups import known_campaign, known_machine
 from api.problems import Problem
 from api.reading.campaigns import load_campaign
-from api.routes.toolings import summary
 from api.schemas.learning import LearnAnswer
 from api.schemas.toolings import ToolingKeys
 from api.security import Caller, Guarded, WhoAsks, now
@@ -22,7 +21,7 @@ from api.stores.campaigns import Campaign
 from api.stores.entities import ABSENT, Document, Expected, Stale, digest_of
 from api.work.learning import learn
 from api.work.requests import MachineText, TooLong, anonymous
-from api.work.toolings import parsed
+from api.work.toolings import parsed, summary
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.toml_text import toml_of
 

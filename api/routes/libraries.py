@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -11,13 +10,11 @@ from fastapi.concurrency import run_in_threadpool
 from api.components import ThisService
 from api.conventions import BODY, found_or_404, guard, problems, while_there
 from api.problems import Problem
-from api.routes.toolings import summary
 from api.schemas.common import NAME_PATTERN
 from api.schemas.libraries import ImportAnswer, ImportedTool
 from api.security import Caller, Guarded, WhoAsks, now
 from api.stores.entities import ABSENT, Document, Stale, digest_of
-from api.work.libraries import LARGEST_LIBRARY, imported
-from rcsa_ident.base.errors import InputError
+from api.work.libraries import LARGEST_LIBRARY, Imported, imported
 from rcsa_ident.io.settings.tool_libraries import Assumptions
 
 router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)
@@ -78,21 +75,20 @@ async def import_library(
     entries = await while_there(request, components.reader.run(imported, raw, given, joint))
 
     def keep() -> list[ImportedTool]:
-        return [_kept(components, caller, *entry, replace) for entry in entries]
+        return [_kept(components, caller, Imported(*entry), replace) for entry in entries]
 
     return ImportAnswer(items=await run_in_threadpool(keep))
 
 
-def _kept(components: Any, caller: Caller, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
+def _kept(components: Any, caller: Caller, entry: Imported, replace: bool) -> ImportedTool:
     """Outcome of one entry, independent of the others."""
+    name, reason = entry.name, entry.reason
     if not reason:
         try:
-            document = Document(caller.group, name, text, json.dumps(summary(text)), digest_of(text), now())
+            document = Document(caller.group, name, entry.text, entry.summary, digest_of(entry.text), now())
             components.store.toolings.put(document, None if replace else ABSENT, caller.note("imported from a tool library"))
-        except InputError as error:
-            reason = str(error)
         except Stale:
             reason = "a tooling of that name is there already (replace=true writes over it)"
     return ImportedTool(
-        name=name, status="skipped" if reason else "written", reason=reason or None, assumed=[] if reason else list(assumed)
+        name=name, status="skipped" if reason else "written", reason=reason or None, assumed=[] if reason else list(entry.assumed)
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
@@ -16,7 +16,7 @@ from api.schemas.common import Page
 from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
 from api.security import Guarded, WhoAsks, now
 from api.stores.entities import Document, digest_of, summary_of
-from api.work.toolings import LARGEST, parsed, tooling_of
+from api.work.toolings import LARGEST, parsed, summary, tooling_of
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.report.drawing import tooling_svg
 
@@ -127,15 +127,6 @@ def forget(name: ToolingName, request: Request, parts: ThisService, caller: WhoA
 def tooling_text(request: Request, raw: bytes) -> str:
     """Return the text of a tooling file from a body in TOML or JSON."""
     return text_of_body(request, raw, ToolingKeys, LARGEST, "tooling")
-
-
-def summary(text: str) -> dict[str, Any]:
-    """What a list tells; everything that the commands would refuse is refused."""
-    tooling = tooling_of(text)
-    cutter = tooling.cutter
-    own = parsed(text).get("name", "")
-    told = {"teeth": cutter.teeth, "diameter_mm": cutter.diameter * 1e3, "stickout_mm": tooling.assembly.stickout * 1e3}
-    return told | {"shape": str(cutter.shape), "label": own[:200]}
 
 
 def answer_of(document: Document) -> ToolingAnswer:

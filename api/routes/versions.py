@@ -16,7 +16,7 @@ from api.lookups import machine_of
 from api.problems import Problem
 from api.routes import robots
 from api.routes.machines import CSV, summary_of
-from api.routes.toolings import TOOLING_BODY, answer_of, summary, tooling_text
+from api.routes.toolings import TOOLING_BODY, answer_of, tooling_text
 from api.schemas.common import NAME_PATTERN, Page
 from api.schemas.machines import Identification, IdentificationSummary
 from api.schemas.robots import RobotAnswer, RobotKeys
@@ -28,7 +28,7 @@ from api.stores.entities import Document, Documents, Stale, digest_of
 from api.stores.entities import summary_of as stored_summary
 from api.work.machine_cache import is_result
 from api.work.robots import parsed as robot_keys
-from api.work.toolings import differences, parsed
+from api.work.toolings import differences, parsed, summary
 
 router = APIRouter(tags=["versions"], route_class=Guarded)
 Version = Annotated[int, Path(ge=1, le=2_000_000_000, description="`version` of an entry of the trail.")]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
+from typing import NamedTuple
 
-from api.work.toolings import tooling_of
+from api.work.toolings import summary, tooling_of
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.io.settings.tool_libraries import Assumptions, import_tools
 from rcsa_ident.setup.tooling import BareCutter
@@ -16,8 +18,18 @@ LARGEST_LIBRARY, MOST_TOOLS = 8_000_000, 2000
 _ALONE = "a cutter without a holder: name one of the library's holders, or send [cutter] beside the modes or FRFs of its tip"
 
 
-def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[tuple[str, str, tuple[str, ...], str]]:
-    """Return for every entry of a library its name, text and assumptions, and the reason where it has no text.
+class Imported(NamedTuple):
+    """An entry of a library: name, text, summary (JSON) and assumptions of its tooling, and the reason where there is none."""
+
+    name: str
+    text: str
+    summary: str
+    assumed: tuple[str, ...]
+    reason: str
+
+
+def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[Imported]:
+    """Return the entries of a library.
 
     `raw`: JSON, or a .tools container
     `contact`: text of the tooling whose contact parameters all toolings get
@@ -29,8 +41,15 @@ def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[
         assumptions = replace(assumptions, contact=known.assembly.contact, spread=known.spread)
     entries = import_tools(raw, "", assumptions, MOST_TOOLS)
     names = library_names([entry.name for entry in entries])
-    told = zip(names, entries, strict=True)
-    return [(name, entry.text, entry.notes, entry.reason or _ALONE * isinstance(entry.tooling, BareCutter)) for name, entry in told]
+    found = []
+    for name, entry in zip(names, entries, strict=True):
+        told, reason = "", entry.reason or _ALONE * isinstance(entry.tooling, BareCutter)
+        try:
+            told = "" if reason else json.dumps(summary(entry.text))
+        except InputError as error:
+            reason = str(error)
+        found.append(Imported(name, entry.text, told, entry.notes, reason))
+    return found
 
 
 def library_names(names: list[str]) -> list[str]:

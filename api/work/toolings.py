@@ -41,6 +41,15 @@ def keys_of(tooling: Tooling) -> dict[str, Any]:
     return parsed(tooling_text(tooling_keys(tooling)))
 
 
+def summary(text: str) -> dict[str, Any]:
+    """Return what a list tells of a tooling; everything that the commands would refuse is refused."""
+    tooling = tooling_of(text)
+    cutter = tooling.cutter
+    own = parsed(text).get("name", "")
+    told = {"teeth": cutter.teeth, "diameter_mm": cutter.diameter * 1e3, "stickout_mm": tooling.assembly.stickout * 1e3}
+    return told | {"shape": str(cutter.shape), "label": own[:200]}
+
+
 def weigh(assembly: ToolAssembly, highest_hz: float) -> None:
     """Refuse a tooling whose finite elements at the highest frequency would be too many."""
     count = expected_elements(assembly, highest_hz)

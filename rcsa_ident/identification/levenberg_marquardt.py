@@ -108,10 +108,11 @@ def _step(misfit: Misfit, theta: FloatArray, layout: Unknowns, here: Evaluation,
     linear = here.linear
     assert linear is not None
     scale = np.sqrt(np.maximum(np.diag(linear.hessian), 1e-12))
-    matrix = linear.hessian / (scale[:, None] * scale)
+    matrix = linear.hessian / scale
+    matrix /= scale[:, None]
     matrix.flat[:: scale.size + 1] += damping
-    # straight to LAPACK: at this size SciPy's own checks would cost as much
-    factor, failed = dpotrf(matrix, lower=1, clean=0)
+    # straight to LAPACK: at this size SciPy's own checks would cost as much; by columns, as it is symmetric, it is copied no more
+    factor, failed = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if failed:
         return None
     velocity = -dpotrs(factor, linear.gradient / scale, lower=1)[0] / scale

@@ -7,10 +7,11 @@ value is a passive machine at every speed: the damping's Hermitian part is D, an
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
-from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, damped_modes
 from rcsa_ident.identification.data import LEVER
@@ -163,12 +164,19 @@ def _apart(x: FloatArray, y: FloatArray) -> FloatArray:
 
 def residual_turn(factor: FloatArray) -> FloatArray:
     """Return the change of R = factor factor^T, its upper triangle by rows, with the factor's lower triangle by rows, shape (r, r)."""
-    size = factor.shape[0]
+    size = factor.shape[0] * (factor.shape[0] + 1) // 2
+    return (_turn_by_entry(factor.shape[0]) @ factor.ravel()).reshape(size, size)
+
+
+@lru_cache
+def _turn_by_entry(size: int) -> FloatArray:
+    """What each entry of the factor, shape (size^2,), gives to `residual_turn`, shape (r^2, size^2)."""
+    entries = np.eye(size**2).reshape(-1, size, size)
     rows, cols = np.tril_indices(size)
-    change = np.zeros((rows.size, size, size))
-    change[np.arange(rows.size), rows] = factor[:, cols].T
-    change += change.transpose(0, 2, 1)
-    return np.ascontiguousarray(change[:, *np.triu_indices(size)].T)
+    change = np.zeros((entries.shape[0], rows.size, size, size))
+    change[:, np.arange(rows.size), rows] = entries[:, :, cols].transpose(0, 2, 1)
+    change += change.transpose(0, 1, 3, 2)
+    return frozen(change[:, :, *np.triu_indices(size)].transpose(2, 1, 0).reshape(-1, size**2))
 
 
 def lower_factor(rows: FloatArray) -> FloatArray:
