@@ -8,7 +8,7 @@ from typing import Protocol
 
 #: What an unfinished job remembers belongs to this version: raise it when steps change their order, names or texts.
 #: A job that began with another version starts over.
-VERSION = "3"
+VERSION = "4"
 #: Returns the stored text of a step by its name, or computes and stores it.
 Remember = Callable[[str, Callable[[], str]], str]
 #: Carries out the job of an id; a repetition gives the same result.

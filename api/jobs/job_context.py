@@ -7,7 +7,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextvars import copy_context
 from typing import Any, TypeVar
 
@@ -164,15 +164,14 @@ class JobContext:
             log.error("a step has failed", exc_info=error, extra={"fields": {"step": name}})
             return {}
 
-    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any], name: str, stage: str, spread: Map = map) -> list[Any]:
-        """Return the results of all tasks in order, each a step of its own.
+    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any], name: str, stage: str, spread: Map = map) -> Iterator[Any]:
+        """Yield the results of all tasks in order, each a step of its own: where nobody asks for the next one, it is not done.
 
         `name`: of this call: unique in the job, and the same in every run
         `stage`: reported as progress meanwhile
         `spread`: the builtin `map` or that of a pool; tasks without a stored result go through it together
         """
         running: Any = None
-        found = []
         for i in range(len(tasks)):
 
             def compute(i: int = i) -> Any:
@@ -182,9 +181,8 @@ class JobContext:
                 return next(running)
 
             self.progress(stage, i, len(tasks))
-            found.append(self.remember(f"{name}.{i}", compute))
+            yield self.remember(f"{name}.{i}", compute)
         self.progress(stage, len(tasks), len(tasks))
-        return found
 
     def progress(self, stage: str, done: int, total: int) -> None:
         """Report the progress of the job."""

@@ -275,7 +275,7 @@ class EvidenceSelection:
                 together = self._together(data, points, felt, searched, apart.candidate, misfit, map, report)
                 if together.evidence < evidence(apart, misfit) - PLAIN_GAIN:
                     return together
-        apart, misfit = fit_jointly(smooth, self.priors, searched, first, report)
+        apart, misfit = fit_jointly(smooth, self.priors, searched, first, report, map)
         if data.sweeps:
             smooth = unswept(data, self.priors, apart.theta, apart.layout).with_smooth_errors(SMOOTH_ERROR)
         grown = grow_jointly(smooth, self.priors, apart, misfit, report)

@@ -90,7 +90,7 @@ def fit_roughly(
 
 
 def fit_jointly(
-    data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate], report: Report
+    data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate], report: Report, map: Map = map
 ) -> tuple[Solution, Misfit]:
     """Return the solution of all axes together, with as many modes as the evidence asks for, and its misfit.
 
@@ -98,10 +98,11 @@ def fit_jointly(
     `searched`: one for each axis
     `first`: from `first_starts`
     `report`: callable of (stage, cost, solution)
+    `map`: the builtin, or a pool's
     """
 
     misfit_of = partial(Misfit, data, priors)
-    start = _from_several_starts(data, priors, searched, first).point
+    start = _from_several_starts(data, priors, searched, first, map).point
     found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
     if data.speed_changes:
         with_softening = _start(data, found.candidate, True)
@@ -145,19 +146,24 @@ def grow_jointly(
     return *refine_and_learn_noise(misfit_of, found.candidate.point, misfit.model_error, misfit.cut_weight, report), chosen
 
 
-def _from_several_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate]) -> Candidate:
+def _from_several_starts(
+    data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate], map: Map
+) -> Candidate:
     """Return the axes' answers polished together with one joint and one force.
 
     Where each axis has found its own joint and its own force, what lies between them may end in another valley: from a few
-    starts, until two have come to the same answer.
+    starts, two at a time, until two have come to the same answer.
     """
-    found = list(first)
-    for start in STARTS[2:]:
-        found.sort(key=lambda candidate: candidate.cost)
+    found = sorted(first, key=lambda candidate: candidate.cost)
+    for pair in (STARTS[2:4], STARTS[4:]):
         if found[1].cost - found[0].cost < SAME_POLISH:
             break
-        found.append(JointStart(data, priors, searched, *start).run())
-    return min(found, key=lambda candidate: candidate.cost)
+        for answer in map(perform, [JointStart(data, priors, searched, *start) for start in pair]):
+            found = sorted([*found, *finite([answer])], key=lambda candidate: candidate.cost)
+            # of a map that has done both at once the second counts no more, as it does not where it would be done now
+            if found[1].cost - found[0].cost < SAME_POLISH:
+                break
+    return found[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -86,8 +86,7 @@ def refine(
             return Solution(theta, layout, here, step is not None, step_number)
         gained = here.cost - trial.cost
         theta = theta + step
-        assert here.linear is not None
-        damping = max(damping * _eased(gained / here.linear.promise(step)), 1e-8)
+        damping = max(0.2 * damping, 1e-8)
         here = misfit.linearised(trial, theta, layout)
         quiet = quiet + 1 if gained < tolerance * here.cost else 0
         if quiet == 2:
@@ -95,24 +94,15 @@ def refine(
     return Solution(theta, layout, here, False, max_steps)
 
 
-def _eased(kept: float) -> float:
-    """Factor on the damping after a step that has gained so much of what the linearised misfit had promised [marquardt1963].
-
-    One that has gained little of it was long enough: a longer one would be rejected.
-    """
-    return 0.2 if kept > 0.75 else 0.5 if kept > 0.5 else 1.0 if kept > 0.25 else 2.0
-
-
 def _step(misfit: Misfit, theta: FloatArray, layout: Unknowns, here: Evaluation, damping: float) -> FloatArray | None:
     """Damped step with geodesic acceleration [transtrum2012]: it bends along the valley, not into its wall."""
     linear = here.linear
     assert linear is not None
     scale = np.sqrt(np.maximum(np.diag(linear.hessian), 1e-12))
-    matrix = linear.hessian / scale
-    matrix /= scale[:, None]
+    matrix = linear.hessian / (scale[:, None] * scale)
     matrix.flat[:: scale.size + 1] += damping
-    # straight to LAPACK: at this size SciPy's own checks would cost as much; by columns, as it is symmetric, it is copied no more
-    factor, failed = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    # straight to LAPACK: at this size SciPy's own checks would cost as much
+    factor, failed = dpotrf(matrix, lower=1, clean=0)
     if failed:
         return None
     velocity = -dpotrs(factor, linear.gradient / scale, lower=1)[0] / scale

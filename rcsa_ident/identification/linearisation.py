@@ -61,7 +61,7 @@ class Linearisation:
         much (0 where by none)
     `gradient`, `hessian`: arrays, shapes (p,), (p, p); of half the cost, the cuts' unknowns eliminated
     `inner`, shape (k, 2, 2): normal equations of each cut's delay and angle
-    `following`, shape (2 k, p): how each of them rises as the parameters fall: what couples them, `inner` taken out; delays before angles
+    `mixed`, shape (k, 2, p): what couples them to the parameters
     `compliance`: tuple of complex arrays, shape (n o, 3); change of each axis' residual, as complex numbers, with the flange's receptance
         tt, tr, rr, for what may be added to it
     """
@@ -76,16 +76,12 @@ class Linearisation:
     gradient: FloatArray
     hessian: FloatArray
     inner: FloatArray
-    following: FloatArray
+    mixed: FloatArray
     compliance: tuple[ComplexArray, ...]
 
     def follow(self, step: FloatArray) -> FloatArray:
         """Return how delay and angle of each cut follow a step of the parameters, shape (k, 2)."""
-        return -(self.following @ step).reshape(2, -1).T
-
-    def promise(self, step: FloatArray) -> float:
-        """Return by how much a step of the parameters lowers the cost to first order in the residual, the cuts' unknowns following."""
-        return -float(step @ (2.0 * self.gradient + self.hessian @ step))
+        return -_solve_pairs(self.inner, self.mixed @ step)
 
     def push(self, step: FloatArray, cuts: FloatArray) -> Residual:
         """Return the residual's change with a step of the parameters and of the cuts' unknowns."""
@@ -112,7 +108,7 @@ class Linearisation:
             sum_cuts(columns, cut, r, right)
         if self.layout.clampings:
             np.add.at(slope, self.clamping[0], self.clamping[1] * residual.cuts[:, 0])
-        return slope - right.T.ravel() @ self.following
+        return slope - np.tensordot(_solve_pairs(self.inner, right), self.mixed, axes=2)
 
     def border(self, rows: Mapping[int, FloatArray], together: int, residual: Residual) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return what further unknowns would add to the normal equations, so many of them at a time.
@@ -146,7 +142,7 @@ class Linearisation:
         gradient -= np.tensordot(right, solved, axes=2)
         shape = (cuts, 2, -1, together)
         own -= np.einsum("cjki,cjkl->kil", turned.reshape(shape), solved.reshape(shape), optimize=True)
-        mixed -= self.following.T @ turned.transpose(1, 0, 2).reshape(2 * cuts, size)
+        mixed -= np.tensordot(self.mixed, solved, axes=((0, 1), (0, 1)))
         return gradient, own, mixed
 
     @property
@@ -158,6 +154,13 @@ class Linearisation:
 
         `covariance`, shape (p, p): covariance of the parameters
         """
-        follow = self.following[: self.inner.shape[0]]
+        follow = np.linalg.solve(self.inner, self.mixed)[:, 0]
         own = np.linalg.inv(self.inner)[:, 0, 0]
         return np.sqrt(own + np.einsum("kp,pq,kq->k", follow, covariance, follow)) * DELAY_UNIT
+
+
+def _solve_pairs(inner: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve symmetric 2 x 2 systems (k, 2, 2) for right sides (k, 2)."""
+    a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
+    determinant = a * c - b * b
+    return np.stack([(c * right[:, 0] - b * right[:, 1]) / determinant, (a * right[:, 1] - b * right[:, 0]) / determinant], axis=1)

@@ -315,14 +315,11 @@ class Misfit:
         low = inner[:, 1, 0] / first
         second = np.sqrt(np.maximum(inner[:, 1, 1] - low**2, 1e-12 * inner[:, 1, 1]))
         upper = mixed[:, 0] / first[:, None]
-        lower = (mixed[:, 1] - low[:, None] * upper) / second[:, None]
-        half = np.concatenate([upper, lower])
+        half = np.concatenate([upper, (mixed[:, 1] - low[:, None] * upper) / second[:, None]])
         hessian -= half.T @ half
-        angles = lower / second[:, None]
-        following = np.concatenate([(upper - low[:, None] * angles) / first[:, None], angles])
         index = tuple(lines.cut for lines in self._axes)
         lines_of = tuple(jacobians), tuple(all_columns), index
-        normal = np.empty(0), hessian, inner, following
+        normal = np.empty(0), hessian, inner, mixed
         linear = Linearisation(layout, *lines_of, known.jacobian, cut_prior, clamping, *normal, tuple(compliance))
         return replace(linear, gradient=linear.pull(residual))
 

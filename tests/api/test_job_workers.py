@@ -57,7 +57,7 @@ def test_a_step_is_computed_once(quiet):
     for _ in range(2):
         with quiet.desk() as desk:
             assert desk.remember("a", partial(compute, 1)) == (1, 1.5)
-            assert desk.map(lambda x: compute(x)[0] * 10, [2, 3], "m", "stage") == [20, 30]
+            assert list(desk.map(lambda x: compute(x)[0] * 10, [2, 3], "m", "stage")) == [20, 30]
     assert calls == [1, 2, 3]
     assert json.loads(quiet.store.jobs.find(quiet.id).progress) == {"stage": "stage", "done": 2, "total": 2}
 
@@ -97,7 +97,7 @@ def test_wherever_it_is_interrupted_each_task_is_done_once(calls, killed_after):
             done.append(x)
             return 2 * x
 
-        return [desk.map(task, tasks, f"{k}", "s") for k, tasks in enumerate(calls)]
+        return [list(desk.map(task, tasks, f"{k}", "s")) for k, tasks in enumerate(calls)]
 
     with suppress(Killed):
         work(killed_after)
