@@ -25,7 +25,7 @@ from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, oblique, open_shop
 from tests.identification.coupled.models import coupled_vector
 
 slow = pytest.mark.slow
-METHOD = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6))
+METHOD = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
 RPM = np.pi / 30.0
 SKEWED = partial(oblique, degrees=10.0, softer=0.6)
 
