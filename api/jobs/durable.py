@@ -11,10 +11,9 @@ from typing import Any
 
 from dbos import DBOS, DBOSClient, DBOSConfig
 from dbos import Serializer as _Serializer
-from sqlalchemy.exc import OperationalError, TimeoutError
 
 from api.jobs.backend import VERSION, Carried, Carry
-from api.stores.entities import Unavailable
+from api.stores.database import answering
 
 #: Interval between two polls for a job [s].
 POLL = 0.5
@@ -97,10 +96,8 @@ class Durable:
     @contextmanager
     def _asking(self) -> Iterator[DBOSClient]:
         assert self.client is not None
-        try:
+        with answering():
             yield self.client
-        except (OperationalError, TimeoutError) as error:
-            raise Unavailable from error
 
 
 def _queue(kind: str) -> str:

@@ -76,6 +76,15 @@ def _destroyed(error: Exception) -> bool:
     return not _DESTROYED.isdisjoint({code & 0xFF if isinstance(code, int) else code for code in codes})
 
 
+@contextmanager
+def answering() -> Iterator[None]:
+    """Raise `Unavailable` where a database does not answer whoever keeps tables of its own in one."""
+    try:
+        yield
+    except (OperationalError, TimeoutError) as error:
+        raise Unavailable from error
+
+
 class Database:
     """Transactions on one database. `group_bytes`: that the rows of a group may take."""
 
