@@ -92,7 +92,7 @@ def main(given: list[str]) -> None:
             for k, checkout in enumerate(checkouts):
                 wall, busy, cost, status, modes = min(each[k] for each in found)
                 total[k] += wall
-                print(f"| {checkout.name} | {jobs} | {seed} | {wall:.2f} | {busy:.2f} | {cost:.2f} | {status} | {modes} |", flush=True)
+                print(f"| {checkout.name} | {jobs} | {seed} | {wall:.2f} | {busy:.2f} | {cost:.14g} | {status} | {modes} |", flush=True)
         for each in workers:
             assert each.stdin is not None
             each.stdin.close()
