@@ -82,6 +82,7 @@ STUDIES = (
     "compile",
     "frozen",
     "walks",
+    "program",
 )
 
 

@@ -28,13 +28,13 @@ from rcsa_ident.io.settings.engagements import write_engagement
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.lobes import DRAWS, method_named
+from rcsa_ident.stability.lobes import method_named
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.toolpath.dexel import DexelField, Surface, memory_of
 from rcsa_ident.toolpath.path import ToolPath
 from rcsa_ident.workflows.paths.milling import mill_path
 from rcsa_ident.workflows.paths.removal import STEP, default_cell, field_of, remove_along, solid_of
-from rcsa_ident.workflows.paths.stability import cuts_along, described, stations_along
+from rcsa_ident.workflows.paths.stability import DRAWS, cuts_along, described, stations_along
 from rcsa_ident.workflows.tool_change import ToolChange
 
 #: Largest files.

@@ -17,6 +17,7 @@ from rcsa_ident.cli.conditions import subjects_of
 from rcsa_ident.cli.lobes import check_plot
 from rcsa_ident.cli.options import TipOptions, option, takes_groups
 from rcsa_ident.cli.path import CellMm, StepMm, Stock, metres, stock_of
+from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.cli.robot import is_robot, posed_robot
 from rcsa_ident.setup.fields import COEFFICIENTS, told_in_si
 from rcsa_ident.stability.methods import MethodName
@@ -67,6 +68,8 @@ def stability(
     step_mm: StepMm = None,
     method: Annotated[MethodName, typer.Option(help="Stability method.")] = MethodName.FULL_DISCRETISATION,
     bands: Annotated[bool, typer.Option(help="Draw machines from what is left open of this one.")] = True,
+    processes: Processes = None,
+    dask: Dask = None,
     plot: Annotated[
         Path | None, typer.Option(help="PART.png or .svg: the part coloured by the margin to chatter.", show_default=False)
     ] = None,
@@ -91,8 +94,9 @@ def stability(
     stages = Stages(quiet=json_)
     with stages.stage("removal") as line:
         removal = remove_along(tooling, path, field, metres("--step-mm", step_mm), line)
-    with stages.stage("stability") as line:
-        found = cuts_along(change, removal.path, removal.engagement, stations_along(machine, tooling, removal.path), line)
+    stations = stations_along(machine, tooling, removal.path)
+    with stages.stage("stability") as line, workers_or_cluster(processes, dask, ("rcsa_ident.workflows.paths.judged_cuts",)) as pool:
+        found = cuts_along(change, removal.path, removal.engagement, stations, line, pool.map)
     way, cutting = removal.path, np.flatnonzero(found.cutting)
     write_columns(out, stability_columns(found, way, cutting))
     _plots(removal, tooling, found, plot, plot_error)
@@ -180,7 +184,8 @@ def _change(machine: TipSource, tooling: Tooling, cut: PathCutOptions, method: M
     import numpy as np
 
     from rcsa_ident.setup.cut import CutSpec
-    from rcsa_ident.stability.lobes import DRAWS, METHODS
+    from rcsa_ident.stability.lobes import METHODS
+    from rcsa_ident.workflows.paths.stability import DRAWS
     from rcsa_ident.workflows.tool_change import ToolChange
 
     speeds = np.zeros(0) if cut.speed_rpm is None else np.array([from_rpm(positive("--speed-rpm", cut.speed_rpm, "rev/min"))])

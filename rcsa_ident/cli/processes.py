@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated
 
@@ -10,7 +10,7 @@ import typer
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.scaleout import cluster_map
-from rcsa_ident.front.processes import Workers, workers
+from rcsa_ident.front.processes import EARLY, Workers, workers
 
 Processes = Annotated[
     int | None, typer.Option(min=1, max=64, help="Number of processes; default: one per core, at most 8.", show_default=False)
@@ -20,10 +20,13 @@ Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help=DASK_HELP, sho
 
 
 @contextmanager
-def workers_or_cluster(processes: int | None, dask: str | None) -> Iterator[Workers]:
-    """Yield what maps: processes here, or the workers of a cluster."""
+def workers_or_cluster(processes: int | None, dask: str | None, early: Sequence[str] = EARLY) -> Iterator[Workers]:
+    """Yield what maps: processes here, or the workers of a cluster.
+
+    `early`: modules that processes here import before the first task comes
+    """
     if dask is None:
-        with workers(processes) as pool:
+        with workers(processes, early) as pool:
             yield pool
         return
     if processes is not None:

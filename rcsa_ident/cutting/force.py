@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -70,6 +71,8 @@ def _turning_directions() -> ComplexArray:
 #: For the force in x and y, and in z beside them.
 _DIRECTIONS = {n: _turning_directions()[..., :n, :].reshape(45, 6 * n) for n in (2, 3)}
 _Q = np.arange(-2.0, 3.0)
+#: Instants times slices of the edge whose force is computed at once: they fit a near cache.
+_TOGETHER = 4096
 
 
 def tooth_force(
@@ -298,26 +301,36 @@ def force_history(
     feed = conditions.feed_per_tooth * cutter.teeth / (2.0 * np.pi)
     parts = slices_of(cutter, depth, slices, engagement.radii, engagement.heights)
     arcs = engagement.arcs(parts.radius, parts.height)
-    for j, k in np.ndindex(parts.lag.shape):
-        phi = np.mod(angle + cutter.tooth_angle[j] - parts.lag[j, k], 2.0 * np.pi)
-        chip = _kinematic_chip(j, np.sin(phi), feed * parts.pitch[:, k], parts.offset[:, k])
-        inside = np.any((phi >= arcs[:, k, :1]) & (phi < arcs[:, k, 1:]), axis=0)
-        force = tooth_force(phi, chip * np.sin(parts.lean[j, k]), coefficients, parts.lean[j, k])
-        total += np.where((inside & (chip > 0.0))[:, None], force, 0.0) * parts.width[j, k]
+    teeth, count = parts.lag.shape
+    block = max(1, _TOGETHER // angle.size)
+    for j, first in itertools.product(range(teeth), range(0, count, block)):
+        own = slice(first, first + block)
+        phi = np.mod(angle[:, None] + cutter.tooth_angle[j] - parts.lag[j, own], 2.0 * np.pi)
+        chip = _kinematic_chip(j, np.sin(phi), feed * parts.pitch[:, own], parts.offset[:, own])
+        inside = np.any((phi >= arcs[:, None, own, 0]) & (phi < arcs[:, None, own, 1]), axis=0)
+        lean = parts.lean[j, own]
+        force = tooth_force(phi, chip * np.sin(lean), coefficients, lean)
+        total += np.einsum("nkd,nk->nd", force, np.where(inside & (chip > 0.0), parts.width[j, own], 0.0))
     total[:, :2] = total[:, :2] @ conditions.machine_from_feed.T
     return total
 
 
 def _kinematic_chip(j: int, sine: FloatArray, feed: FloatArray, runout: FloatArray) -> FloatArray:
-    """Chip of tooth j: the smallest distance to the surfaces left by the teeth ahead, over one revolution of them."""
+    """Chip of tooth j at slices of the edge, shape (n, k): the smallest distance to what the teeth ahead left, over one revolution of them.
+
+    `sine`, shape (n, k); `feed`, `runout` [m], shape (teeth, k)
+    """
     moved, offset = _chip_bounds(j, feed, runout)
-    return np.min(moved * sine[..., None] + offset, axis=-1)
+    chip = moved[0] * sine + offset[0]
+    for a, b in zip(moved[1:], offset[1:], strict=True):
+        np.minimum(chip, a * sine + b, out=chip)
+    return chip
 
 
 def _chip_bounds(j: int, feed: FloatArray, runout: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Distances a sin(phi) + b of tooth j to the surfaces of the teeth ahead, over one revolution of them: a and b, shape (teeth,)."""
-    ahead = (j + np.arange(feed.size)) % feed.size
-    return np.cumsum(feed[ahead]), runout[j] - runout[(ahead + 1) % feed.size]
+    """Distances a sin(phi) + b of tooth j to the surfaces of the teeth ahead, over one revolution of them: a and b, shape (teeth, ...)."""
+    ahead = (j + np.arange(len(feed))) % len(feed)
+    return np.cumsum(feed[ahead], axis=0), runout[j] - runout[(ahead + 1) % len(feed)]
 
 
 def scaled_force(slope: ComplexArray, logs: FloatArray, exact: Mapping[ForceTerm, int]) -> tuple[ComplexArray, ComplexArray]:

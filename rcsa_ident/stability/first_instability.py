@@ -36,7 +36,7 @@ def first_loss(
             seen[depth] = growth(depth)
         return seen[depth]
 
-    low = min(low, 0.5 * high)
+    low = low if low < high else 0.5 * high
     at_low = known(low)
     for _ in range(40):
         if at_low < 0.0:

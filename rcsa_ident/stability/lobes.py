@@ -132,7 +132,7 @@ def limits_of(
     """Return what `stability_lobes` does, without a word on what is unusual about its speeds and modes: whoever pads speeds says it."""
     speeds = asked_speeds(speeds)
     max_depth = SEARCHED_DEPTH.checked("max_depth", max_depth)
-    _affordable(method, tip, process, speeds, max_depth)
+    affordable(method, tip, process, speeds, max_depth)
     within = process.within_reach(max_depth)
     # an engagement that the cutter cannot have is said before anything is computed
     widest(process.engagement, process.cutter.outline, within)
@@ -153,7 +153,7 @@ def asked_speeds(speeds: FloatArray) -> FloatArray:
     return speeds
 
 
-def _affordable(method: StabilityMethod, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> None:
+def affordable(method: StabilityMethod, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> None:
     """Refuse a speed that is so low that its limit takes hours and all memory: both grow as it falls."""
     top = float(np.abs(tip.pole).max()) if isinstance(tip, TipModes) else float(tip.omega[-1])
     seconds = method.seconds_per_operation * method.operations(process, speeds, top, max_depth)
@@ -190,12 +190,8 @@ def _limits(
     if isinstance(both, TipModes) or method.needs == "receptance":
         found = method.lobes(both, process, speeds, max_depth)
     else:
-        known = known_modes(both)
-        modes, error = fitted_modes(both) if known is None else known
+        modes, told = as_modes(both)
         found = method.lobes(modes, process, speeds, max_depth)
-        share = f"{100.0 * error:.2g}" if error > 1e-4 else "less than 0.01"
-        what, noise = ("a fit with", ", noise included") if known is None else ("the assembly's own", "")
-        told = f"the receptance was replaced by {what} {modes.pole.size} modes (relative error {share} %{noise})"
         found = replace(found, warnings=(*found.warnings, told))
     axial = "" if plain else _axial(both, process, found)
     found = replace(found, warnings=(*found.warnings, *([axial] if axial else []), *process.remarks))
@@ -205,6 +201,17 @@ def _limits(
         return replace(found, drawn=drawn_limits(tip, process, speeds, max_depth, draws, seed))
     modes = fitted_modes(directions_for(process, tip))[0] if modes is None else modes
     return with_own_draws(found, tip, modes, process, draws, seed)
+
+
+def as_modes(tip: Receptance | TipModes) -> tuple[TipModes, str]:
+    """Return what stands for a tip where a method needs modes, and how well it does, in words; empty of modes."""
+    if isinstance(tip, TipModes):
+        return tip, ""
+    known = known_modes(tip)
+    modes, error = fitted_modes(tip) if known is None else known
+    share = f"{100.0 * error:.2g}" if error > 1e-4 else "less than 0.01"
+    what, noise = ("a fit with", ", noise included") if known is None else ("the assembly's own", "")
+    return modes, f"the receptance was replaced by {what} {modes.pole.size} modes (relative error {share} %{noise})"
 
 
 def _axial(tip: Receptance | TipModes, process: MillingProcess, found: StabilityLobes) -> str:
@@ -230,7 +237,7 @@ def drawn_limits(
     Infinite beyond `max_depth`. They are told from a part of the frequencies: close where the tip's receptance changes from line to line,
     far apart where a quintic goes through it.
     """
-    drawn = _draws(tip, process, draws, seed)
+    drawn = draws_of(tip, process, draws, seed)
     return _ZERO_ORDER.depths(drawn.omega, drawn.tips, process, speeds, max_depth, drawn.factors)
 
 
@@ -254,7 +261,7 @@ def with_own_draws(
     Of the speeds some `APART` from each other are asked, and those where the limit is highest or lowest beside its neighbours; between
     them the ratio to the limit of the tip itself is a straight line.
     """
-    drawn, speeds, deepest = _draws(tip, process, draws, seed), known.spindle_speed, known.max_depth
+    drawn, speeds, deepest = draws_of(tip, process, draws, seed), known.spindle_speed, known.max_depth
     tips = drawn_tips(drawn.omega, drawn.middle, drawn.tips, modes, of_draw(process, drawn.factors, draws))
     order = np.argsort(speeds, kind="stable")
     limit = known.nominal[order]
@@ -284,7 +291,7 @@ def _telling(speeds: FloatArray, limit: FloatArray) -> NDArray[np.intp]:
     return np.flatnonzero(kept)
 
 
-class _Draws(NamedTuple):
+class Draws(NamedTuple):
     """Tips drawn from a spread: frequencies, the middle (n, r, r), draws (d, n, r, r), factors of K_tc and K_rc / K_tc (d, 2) or None."""
 
     omega: FloatArray
@@ -293,7 +300,7 @@ class _Draws(NamedTuple):
     factors: FloatArray | None
 
 
-def _draws(tip: UncertainReceptance, process: MillingProcess, draws: int, seed: int) -> _Draws:
+def draws_of(tip: UncertainReceptance, process: MillingProcess, draws: int, seed: int) -> Draws:
     nodes, known = tip.thinned(), process.coefficients
     wanted = TIP if process.is_plain else known_directions(nodes)
     tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes, wanted)
@@ -302,7 +309,7 @@ def _draws(tip: UncertainReceptance, process: MillingProcess, draws: int, seed: 
         # from draws of their own, so that machines are the same ones whatever is known of the coefficients
         weights = np.random.default_rng([seed, 1]).standard_normal((draws, 2))
         factors = np.exp(weights * (known.tangential_spread, known.ratio_spread))
-    return _Draws(nodes.omega, embedded(nodes.values[None], nodes, wanted)[0], tips, factors)
+    return Draws(nodes.omega, embedded(nodes.values[None], nodes, wanted)[0], tips, factors)
 
 
 def asked_directions(process: MillingProcess) -> tuple[Coordinate, ...]:

@@ -168,7 +168,7 @@ class StabilityLobes(Drawn):
         >>> bool((lobes.limit_quantile(0.95) < lobes.limit_depth).all())
         True
         """
-        return _held_by(np.minimum(self.limit_depth[None] if self.drawn is None else self.drawn, self.max_depth), probability)
+        return held_by(np.minimum(self.limit_depth[None] if self.drawn is None else self.drawn, self.max_depth), probability)
 
     def probability(self, place: int, depth: float) -> float | None:
         """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them.
@@ -240,7 +240,7 @@ class StabilityLobes(Drawn):
             return least
         drawn = np.minimum(self.drawn, self.max_depth)
         each = np.array([least_within_tolerance(self.spindle_speed, limit, tolerance) for limit in drawn])
-        return np.minimum(least, _held_by(each, probability))
+        return np.minimum(least, held_by(each, probability))
 
     def searched(self, depth: FloatArray, reserve: float = 0.0) -> FloatArray:
         """Return depths with infinity in place of what is as deep as the search went, less a reserve: no limit was found there."""
@@ -329,7 +329,7 @@ class StabilityLobes(Drawn):
         return f"{self.method}, {low:.0f} to {high:.0f} rev/min{anywhere}" + (f"; best {best[0]}" if best else "")
 
 
-def _held_by(limits: FloatArray, probability: float) -> FloatArray:
+def held_by(limits: FloatArray, probability: float) -> FloatArray:
     """The depth up to which at least this share of some limits, shape (d, n), is stable, shape (n,)."""
     if not 0.0 < probability <= 1.0:
         raise InputError("probability", probability, "above 0 and not above 1")

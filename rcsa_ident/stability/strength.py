@@ -23,8 +23,8 @@ from rcsa_ident.stability.zero_order import ZeroOrder
 
 #: How far beside a strength that is about right the right one is looked for at first, as a factor.
 _BESIDE = 1.1
-#: Said where it is no multiplier that decides.
-_PASSES = f"the margin is that to a vibration which grows a thousandfold within {PASSES} teeth, although it would die away after them"
+#: Said of a margin where it is no multiplier that decides.
+PASSING = f"the margin is that to a vibration which grows a thousandfold within {PASSES} teeth, although it would die away after them"
 
 
 class Strength(NamedTuple):
@@ -103,7 +103,7 @@ def _by_multipliers(
     at = _first(growth, low, high, search)
     high = min(at, high) + float(np.log(BEFORE))
     if high > low and passing(high) >= 0.0:
-        at, told = _first(passing, low, high, search), (_PASSES,)
+        at, told = _first(passing, low, high, search), (PASSING,)
     if np.isinf(at):
         return Strength(search.most, np.nan)
     own = cut(at)

@@ -146,7 +146,7 @@ def surface_location_error(
     offset = edges_at(cutter, height, np.full(height.shape, 0.5 * np.pi)).offset
     outward = 1.0 if side is Wall.EXIT else -1.0
     normal = process.machine_from_feed[:, 1]
-    response = _Tip(_from_dc(tip) if isinstance(tip, TipModes) else tip)
+    response = _Tip(from_rest(tip))
     error = np.empty((speeds.size, heights))
     tail = 0.0
     for i, speed in enumerate(speeds.tolist()):
@@ -169,7 +169,7 @@ def forced_vibration(tip: Receptance | TipModes, process: MillingProcess, speed:
     `process`: with a feed per tooth
     `speed` [rad/s]; `depth` [m]
     """
-    response = _Tip(_from_dc(tip) if isinstance(tip, TipModes) else tip)
+    response = _Tip(from_rest(tip))
     orders = np.arange(min(int(response.omega[-1] / speed), MOST_ORDERS, instants // 2 - 1) + 1)
     lines = runout_force_lines if process.cutter.offset else force_lines
     force = lines(process.cutter, process.conditions(speed, depth), process.coefficients, orders)
@@ -247,8 +247,10 @@ def _doubts(process: MillingProcess, tip: _Tip, speeds: FloatArray, tail: float)
     return doubts
 
 
-def _from_dc(modes: TipModes) -> Receptance:
-    """The receptance of modes from 0 Hz to four times the highest, at frequencies that resolve the sharpest."""
-    fine = modes.receptance().omega
+def from_rest(tip: Receptance | TipModes) -> Receptance:
+    """Return the receptance of a tip's modes from 0 Hz to four times the highest, at frequencies that resolve the sharpest."""
+    if not isinstance(tip, TipModes):
+        return tip
+    fine = tip.receptance().omega
     omega = np.arange(0.0, 2.0 * fine[-1], fine[1] - fine[0])
-    return Receptance(omega, modes.planar.response(omega), TIP, TIP)
+    return Receptance(omega, tip.planar.response(omega), TIP, TIP)

@@ -12,13 +12,14 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import same_everywhere
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.directional import mean_directional_matrix
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.stability._kernels.depth_at_speed import envelope, envelopes, largest_real_part, pitch_envelope
 from rcsa_ident.stability.depth_march import Marched, finer, ladder, march, strengths
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.stability.regeneration import check_constant
+from rcsa_ident.stability.regeneration import check_constant, regeneration
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import DIRECTIONS, TipModes, receptance_of
 
@@ -31,6 +32,10 @@ _MARCH = 2500.0
 #: How many times as long as the tip remembers a vibration the next tooth may take: about from there on one grew a thousandfold before it
 #: died away, in cuts with one mode by full discretisation. Where the tip is asked, as shares of the critical frequency.
 _FORGOTTEN, _BELOW, _ABOVE = 8.0, 0.8, 1.1
+#: Difference of pitches up to which teeth are alike [rad].
+_ALIKE = 1e-9
+#: Times the limit of a tip up to which those of others like it are looked for.
+_OVER = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,9 +145,8 @@ class ZeroOrder:
     ) -> FloatArray:
         """Return what `depths` does for a shaped cut; its ladder is linear in K_tc and in k_rc."""
         check_constant(process)
-        directions, known = tips.shape[-1], process.coefficients
-        whole = ladder(process, directions, max_depth)
-        half = ladder(replace(process, coefficients=replace(known, radial_ratio=0.5 * known.radial_ratio)), directions, max_depth)
+        directions = tips.shape[-1]
+        whole, half = (ladder(each, directions, max_depth) for each in (process, _half_ratio(process)))
         names = DIRECTIONS[:directions]
         limits = []
         for k, values in enumerate(tips):
@@ -180,34 +184,110 @@ class ZeroOrder:
         """
         if not process.is_plain:
             return self._marched_depths(omega, tips, process, speeds, max_depth, factors)
-        alpha = np.repeat(_directions(process)[None], len(tips), axis=0)
+        kept, order = _above_rest(omega), np.argsort(speeds, kind="stable")
+        loop = _Loop(process.cutter, process.coefficients.tangential, _directions(process), _of_ratio(process))
+        found = loop.limits(omega[kept], tips[:, kept], np.ascontiguousarray(speeds[order]), factors)
+        limits = np.empty(found.shape)
+        limits[:, order] = np.where(found <= max_depth, found, np.inf)
+        return limits
+
+    def shares(
+        self, middle: Receptance, tips: ComplexArray, process: MillingProcess, speed: float, depth: float, factors: FloatArray | None = None
+    ) -> tuple[float, FloatArray]:
+        """Return the margin of a cut on the tip in the middle of many, and what the limits of these are beside its limit.
+
+        Parameters
+        ----------
+        middle : Receptance
+            In the directions that count for the cut.
+        tips : complex array, shape (d, n, r, r) [m/N]
+            At its frequencies, in these directions.
+        speed : float [rad/s]
+        depth : float [m]
+            Of a cut that changes along the edge: there it is the strength of the material that has a limit, and X and Y alone count.
+        factors : array, shape (d, 2) [-], or None
+            On K_tc and k_rc of the cut with each tip.
+
+        Returns
+        -------
+        float
+            The limit over the depth, or how many times stronger the material may be; infinite where there is none.
+        array, shape (d,)
+            Ones where the middle has no limit; infinite where a tip has none below `_OVER` times that of the middle: frequencies whose
+            boundary lies above that, whatever the speed, take no part.
+        """
+        at, kept = np.array([speed]), slice(_above_rest(middle.omega)[0], None)
+        omega, center, tips = middle.omega[kept], middle.values[None, kept, :2, :2], tips[:, kept, :2, :2]
+        if process.is_plain:
+            loop = _Loop(process.cutter, process.coefficients.tangential, _directions(process), _of_ratio(process))
+        else:
+            matrix, half = (regeneration(each, depth, 2).mean for each in (process, _half_ratio(process)))
+            loop = _Loop(process.cutter, 1.0, matrix, 2.0 * (matrix - half))
+        limit = float(loop.limits(omega, center, at)[0, 0])
+        if not np.isfinite(limit):
+            return np.inf, np.ones(len(tips))
+        found = np.full(len(tips), np.inf)
+        for run in _runs(loop.boundary(center[0]) < _OVER * limit):
+            found = np.minimum(found, loop.limits(omega[run], tips[:, run], at, factors)[:, 0] / limit)
+        return limit / depth if process.is_plain else limit, found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Loop:
+    """A cut whose mean stiffness in X and Y is proportional to what has a limit.
+
+    `stiffness`: factor on both matrices
+    `matrix`, `change`, shape (2, 2): the mean stiffness of 1 - e^{-i w tau}, and what of it is in proportion to k_rc
+    """
+
+    cutter: Cutter
+    stiffness: float
+    matrix: FloatArray
+    change: FloatArray
+
+    def boundary(self, tip: ComplexArray) -> FloatArray:
+        """Return the lowest boundary at each frequency of a tip, shape (n, 2, 2), whatever the speed; infinite where there is none."""
+        loop = self.stiffness * self.matrix @ tip
+        half = 0.5 * np.einsum("nii->n", loop)
+        root = np.sqrt(half**2 - loop[:, 0, 0] * loop[:, 1, 1] + loop[:, 0, 1] * loop[:, 1, 0])
+        strongest = np.maximum((half + root).real, (half - root).real)
+        return np.divide(0.5, strongest, out=np.full(strongest.shape, np.inf), where=strongest > 0.0)
+
+    def limits(self, omega: FloatArray, tips: ComplexArray, speeds: FloatArray, factors: FloatArray | None = None) -> FloatArray:
+        """Return the limits of many tips, shape (d, m), infinite where there is none.
+
+        `omega`, shape (n,): above 0; `tips`, shape (d, n, 2, 2)
+        `speeds`, shape (m,): rising
+        `factors`, shape (d, 2), or None: on K_tc and k_rc with each tip
+        """
+        alpha = np.repeat(self.matrix[None], len(tips), axis=0)
         if factors is not None:
-            alpha += (factors[:, 1] - 1.0)[:, None, None] * _of_ratio(process)
-        kept = _above_rest(omega)
-        omega = np.ascontiguousarray(omega[kept])
-        x, y = (np.ascontiguousarray(tips[:, kept, i, i]) for i in range(2))
-        xy, yx = tips[:, kept, 0, 1], tips[:, kept, 1, 0]
-        order = np.argsort(speeds, kind="stable")
-        ascending, stiffness = np.ascontiguousarray(speeds[order]), process.coefficients.tangential
-        teeth, pitch = process.cutter.teeth, process.cutter.pitch
-        if _equal_pitch(process) and not np.any(xy) and not np.any(yx):
-            found = envelopes(omega, x, y, alpha, stiffness, teeth, ascending)
+            alpha += (factors[:, 1] - 1.0)[:, None, None] * self.change
+        omega = np.ascontiguousarray(omega)
+        x, y = (np.ascontiguousarray(tips[:, :, i, i]) for i in range(2))
+        xy, yx = tips[:, :, 0, 1], tips[:, :, 1, 0]
+        teeth, pitch, equal = self.cutter.teeth, self.cutter.pitch, bool(np.ptp(self.cutter.pitch) < _ALIKE)
+        if equal and not np.any(xy) and not np.any(yx):
+            found = envelopes(omega, x, y, alpha, self.stiffness, teeth, speeds)
         else:
             xx, down, up, yy = alpha.reshape(-1, 4).T[:, :, None]
             traces = xx * x + down * yx + up * xy + yy * y
             determinants = (xx * yy - down * up) * (x * y - xy * yx)
             _finite(traces, determinants)
             each = zip(traces, determinants, strict=True)
-            if _equal_pitch(process):
-                found = np.array([envelope(omega, t, d, stiffness, teeth, ascending)[0] for t, d in each])
+            if equal:
+                found = np.array([envelope(omega, t, d, self.stiffness, teeth, speeds)[0] for t, d in each])
             else:
-                found = np.array([pitch_envelope(omega, t, d, stiffness, pitch, ascending)[0] for t, d in each])
+                found = np.array([pitch_envelope(omega, t, d, self.stiffness, pitch, speeds)[0] for t, d in each])
         _finite(np.where(np.isinf(found), 0.0, found))
-        if factors is not None:
-            found = found / factors[:, :1]
-        limits = np.empty(found.shape)
-        limits[:, order] = np.where(found <= max_depth, found, np.inf)
-        return limits
+        return found if factors is None else found / factors[:, :1]
+
+
+def _runs(there: NDArray[np.bool_]) -> list[slice]:
+    """Return the runs of places where something is so, with a neighbour on either side."""
+    wide = there | np.concatenate([there[1:], [False]]) | np.concatenate([[False], there[:-1]])
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], wide, [False]]).astype(int)))
+    return [slice(int(first), int(last)) for first, last in ends.reshape(-1, 2)]
 
 
 def _directions(process: MillingProcess) -> FloatArray:
@@ -218,12 +298,17 @@ def _directions(process: MillingProcess) -> FloatArray:
 
 def _of_ratio(process: MillingProcess) -> FloatArray:
     """What of [alpha0] is in proportion to k_rc."""
+    return 2.0 * (_directions(process) - _directions(_half_ratio(process)))
+
+
+def _half_ratio(process: MillingProcess) -> MillingProcess:
+    """The cut with half of k_rc."""
     known = process.coefficients
-    return 2.0 * (_directions(process) - _directions(replace(process, coefficients=replace(known, radial_ratio=0.5 * known.radial_ratio))))
+    return replace(process, coefficients=replace(known, radial_ratio=0.5 * known.radial_ratio))
 
 
 def _equal_pitch(process: MillingProcess) -> bool:
-    return bool(np.ptp(process.cutter.pitch) < 1e-9)
+    return bool(np.ptp(process.cutter.pitch) < _ALIKE)
 
 
 def _characteristic(receptance: Receptance, alpha: FloatArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:

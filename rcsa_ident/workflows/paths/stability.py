@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -12,38 +11,30 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.base.scaleout import Map
 from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement, EngagementMap
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import force_history
-from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.machine.robot.posed_robot import PosedRobot
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.lobes import both_directions, stability_lobes
-from rcsa_ident.stability.strength import Search, strength
-from rcsa_ident.stability.surface_error import forced_vibration, surface_location_error
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.margins import FARTHEST
 from rcsa_ident.toolpath.engagement import PathEngagement
 from rcsa_ident.toolpath.path import ToolPath
+from rcsa_ident.workflows.paths.judged_cuts import Cut, judged
 from rcsa_ident.workflows.paths.robot_milling import feed_turn
 from rcsa_ident.workflows.robot_postures import following
-from rcsa_ident.workflows.tool_change import ToolChange, modes_of
+from rcsa_ident.workflows.tool_change import ToolChange
 
-#: Farther from chatter than this nobody asks how far: a margin is told up to it.
-FARTHEST = 4.0
 #: Entry and exit, direction of the feed [rad] and share of the depth within which two cuts count as one; arcs that change less along the
 #: edge are the same all along it.
 SAME_ANGLE, SAME_WAY, SAME_DEPTH = np.radians(2.0), np.radians(5.0), 0.02
 #: What is taken off one wall once more is no cut: share of the cutter's diameter, and of a turn for angles as near to a wall.
 _GRAZING = 1e-3
+#: Machines drawn from what is left open of one: of the twentieth that bears least ten are left.
+DRAWS = 200
 #: Way on which a robot counts as standing at one posture [m].
 EVERY = 0.02
-#: Up to which share the margin of a cut whose arcs change is told.
-_MARGIN = 0.01
-#: Instants of a revolution, and slices of the depth, for forces.
-_ANGLES, _SLICES = 180, 16
 
 
 class Station(NamedTuple):
@@ -91,8 +82,7 @@ class CutsAlong:
     `margin`, shape (k,): how many times as deep as it is a cut becomes unstable, where it is the same all along the edge; else how many
         times stronger the material would have to be. Below 1 it chatters; `FARTHEST` says as much or more.
     `of_strength`: array of bool, shape (k,); where the margin is the material's: of cuts that change along the edge
-    `margin_low`, shape (k,): what 95 % of the drawn machines reach; the margin itself where none are drawn, and of cuts that change along
-        the edge
+    `margin_low`, shape (k,): what 95 % of the drawn machines reach; the margin itself where none are drawn
     `chatter_frequency` [rad/s], shape (k,): at the limit
     `mean_force` [N], shape (k, 3): on the tool along the feed, its normal and the axis towards the spindle
     `peak_force` [N], shape (k,): across the axis, in a revolution
@@ -137,6 +127,7 @@ def cuts_along(
     engaged: PathEngagement,
     stations: Callable[[int], Station],
     progress: Callable[[int, int], None] | None = None,
+    map_: Map = map,
 ) -> CutsAlong:
     """Return what a tool does on every move of a path.
 
@@ -155,6 +146,8 @@ def cuts_along(
         Who carries the tool on a move.
     progress : callable, optional
         Told how many different cuts are done, and of how many.
+    map_ : callable, optional
+        Over tasks of some cuts: the builtin, a pool's, a cluster's. The answer is the same, to the last digit.
 
     Raises
     ------
@@ -165,10 +158,10 @@ def cuts_along(
     told = path.speed[1:]
     speed = np.where(np.isnan(told), change.speeds[0], told) if change.speeds.size == 1 else told
     teeth = change.tooling.cutter.teeth
-    rows = {name: np.full(moves, np.nan) for name in ("depth", "feed", "margin", "low", "chatter", "peak", "deflection", "error")}
-    mean, of_strength = np.full((moves, 3), np.nan), np.zeros(moves, dtype=bool)
+    depths, feed, of_strength = np.full(moves, np.nan), np.full(moves, np.nan), np.zeros(moves, dtype=bool)
     groups: dict[tuple[object, ...], list[int]] = {}
-    cuts: dict[tuple[object, ...], tuple[Station, AnyEngagement, float]] = {}
+    cuts: list[Cut] = []
+    tips: dict[tuple[object, ...], tuple[int, ToolChange]] = {}
     for move in range(moves):
         found = engaged.at(move)
         if found is None or not path.cutting[move] or not float(found.heights[-1]) > 0.0:
@@ -180,66 +173,31 @@ def cuts_along(
         if isinstance(engagement, Engagement) and engagement.immersion < _GRAZING:
             continue
         station = stations(move)
-        rows["depth"][move] = depth
-        rows["feed"][move] = 2.0 * np.pi * path.feed[move + 1] / (teeth * speed[move])
-        key: tuple[object, ...] = (
-            id(station.machine),
-            _rounded(station, engagement, depth),
-            round(speed[move], 6),
-            round(1e9 * rows["feed"][move]),
-        )
-        groups.setdefault(key, []).append(move)
-        cuts.setdefault(key, (station, engagement, depth))
-    warnings: list[str] = []
-    near = np.nan
-    tips: dict[tuple[int, float], tuple[Receptance | TipModes, Receptance | TipModes]] = {}
-    for done, (key, which) in enumerate(groups.items()):
-        station, engagement, depth = cuts[key]
-        first = which[0]
-        cut = replace(
-            change.cut,
-            engagement=engagement,
-            feed_angle=station.feed_angle,
-            feed_per_tooth=float(rows["feed"][first]),
-            speed_variation=None,
-        )
-        one = replace(change, machine=station.machine, cut=cut, speeds=speed[first : first + 1])
-        place = id(station.machine), float(speed[first])
-        if place not in tips:
-            ((_, tip),) = one.tips(one.speeds, one.omega, spread=change.draws > 0)
-            tips[place] = tip, modes_of(tip, one.process) if change.method.needs == "modes" else tip
-        answer = _Answer.of(one, *tips[place], depth, near)
-        for name, value in (
-            ("margin", answer.margin),
-            ("low", answer.low),
-            ("chatter", answer.chatter),
-            ("peak", answer.peak),
-            ("deflection", answer.deflection),
-            ("error", answer.error),
-        ):
-            rows[name][which] = value
-        mean[which] = answer.mean
-        of_strength[which] = not isinstance(engagement, Engagement)
-        near = near if isinstance(engagement, Engagement) else answer.margin
-        # how thin a chip is the path says, and not whoever gave it
-        warnings += [each for each in answer.warnings if not each.startswith("radial immersion")]
-        if progress is not None:
-            progress(done + 1, len(groups))
-    return CutsAlong(
-        rows["depth"],
-        np.where(np.isnan(rows["depth"]), np.nan, speed),
-        rows["feed"],
-        rows["margin"],
-        of_strength,
-        rows["low"],
-        rows["chatter"],
-        mean,
-        rows["peak"],
-        rows["deflection"],
-        rows["error"],
-        len(groups),
-        _alike_once(warnings),
-    )
+        depths[move] = depth
+        feed[move] = 2.0 * np.pi * path.feed[move + 1] / (teeth * speed[move])
+        of_strength[move] = not isinstance(engagement, Engagement)
+        alike = id(station.machine), _rounded(station, engagement, depth), round(speed[move], 6), round(1e9 * feed[move])
+        if alike not in groups:
+            per_tooth = float(feed[move])
+            spec = replace(change.cut, engagement=engagement, feed_angle=station.feed_angle, feed_per_tooth=per_tooth, speed_variation=None)
+            one = replace(change, machine=station.machine, cut=spec, speeds=speed[move : move + 1])
+            process = one.process
+            place = id(station.machine), float(speed[move]), process.is_plain
+            cuts.append(Cut(tips.setdefault(place, (len(tips), one))[0], process, depth))
+        groups.setdefault(alike, []).append(move)
+    answers = judged([each for _, each in tips.values()], cuts, map_, progress)
+    margins, columns = (np.full((3, moves), np.nan) for _ in range(2))
+    mean = np.full((moves, 3), np.nan)
+    for which, answer in zip(groups.values(), answers, strict=True):
+        margins[:, which] = np.array(answer.margin[:3])[:, None]
+        columns[:, which] = np.array(answer[2:])[:, None]
+        mean[which] = answer.mean_force
+    # how thin a chip is the path says, and not whoever gave it
+    warnings = [each for answer in answers for each in answer.margin.warnings if not each.startswith("radial immersion")]
+    spindle = np.where(np.isnan(depths), np.nan, speed)
+    (times, low, chatter), (peak, moved, error) = margins, columns
+    said = _alike_once(warnings)
+    return CutsAlong(depths, spindle, feed, times, of_strength, low, chatter, mean, peak, moved, error, len(groups), said)
 
 
 def _alike_once(warnings: Sequence[str]) -> tuple[str, ...]:
@@ -284,55 +242,6 @@ def _told(path: ToolPath, move: int) -> str:
     line = int(path.line[move + 1])
     place = ", ".join(f"{1e3 * v:.3f}" for v in path.places[move + 1])
     return f"{place} mm" + (f", line {line}" if line else "")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Answer:
-    """Of one cut, as `CutsAlong` has them."""
-
-    margin: float
-    low: float
-    chatter: float
-    mean: FloatArray
-    peak: float
-    deflection: float
-    error: float
-    warnings: Sequence[str]
-
-    @classmethod
-    def of(cls, change: ToolChange, tip: Receptance | TipModes, modes: Receptance | TipModes, depth: float, near: float) -> _Answer:
-        """Of a tip, of what stands for it where a method wants modes, and the margin of the cut before, which is similar."""
-        process = change.process
-        if isinstance(process.engagement, Engagement):
-            margin, low, chatter, warnings = _margin(change, tip, process, depth)
-        else:
-            search = Search(FARTHEST, _MARGIN, near)
-            margin, chatter, warnings = strength(change.method, modes, process, float(change.speeds[0]), depth, search)
-            low = margin
-        speed = float(change.speeds[0])
-        angle = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
-        force = force_history(process.cutter, process.conditions(speed, depth), process.coefficients, angle, _SLICES) * [1.0, 1.0, -1.0]
-        # from the machine's axes into the feed's
-        force[:, :2] = force[:, :2] @ process.machine_from_feed
-        moved, error = np.nan, np.nan
-        plane = tip if isinstance(tip, TipModes) else both_directions(tip)
-        if margin >= 1.0:
-            moved = float(np.max(np.linalg.norm(forced_vibration(plane, process, speed, depth), axis=1)))
-            # no wall is left by most cuts of a shape, and by cuts in the middle of the material
-            with suppress(InputError):
-                error = float(surface_location_error(plane, process, np.array([speed]), depth).mean[0])
-        peak = float(np.max(np.linalg.norm(force[:, :2], axis=1)))
-        return cls(margin, low, chatter, force.mean(axis=0), peak, moved, error, warnings)
-
-
-def _margin(
-    change: ToolChange, tip: Receptance | TipModes, process: MillingProcess, depth: float
-) -> tuple[float, float, float, Sequence[str]]:
-    """How many times as deep a cut becomes unstable, what drawn machines reach, the frequency of chatter, and what speaks against it."""
-    found = stability_lobes(tip, process, change.speeds, FARTHEST * depth, change.method, change.draws)
-    margin = min(float(found.limit_depth[0]) / depth, FARTHEST)
-    low = margin if found.drawn is None else min(float(found.limit_quantile(0.95)[0]) / depth, margin)
-    return margin, low, float(found.chatter_frequency[0]), found.warnings
 
 
 def described(found: CutsAlong, path: ToolPath) -> str:

@@ -1,6 +1,9 @@
 """Cuts along a path: margins are those of lobes, forces and walls those of the cut at each place; what is alike is asked once."""
 
+import pickle
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,10 +19,11 @@ from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import BareCutter
 from rcsa_ident.stability.discretisation import FullDiscretisation
+from rcsa_ident.stability.margins import FARTHEST
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from rcsa_ident.workflows.paths.removal import field_of, remove_along
-from rcsa_ident.workflows.paths.stability import FARTHEST, CutsAlong, cuts_along, described, plain, stations_along
+from rcsa_ident.workflows.paths.stability import CutsAlong, cuts_along, described, plain, stations_along
 from rcsa_ident.workflows.tool_change import ToolChange, surface_of
 
 TOOL = BareCutter("end mill", Cutter(3, 0.01, np.radians(30.0)))
@@ -115,6 +119,26 @@ def test_two_layers_are_a_map_whose_margin_lies_between_those_of_its_layers() ->
     # deeper it would be another cut: how strong the material may be is told, and no limit
     assert found.of_strength[-3]
     assert np.isnan(found.limit[-3])
+
+
+def test_the_answer_is_the_same_whatever_maps() -> None:
+    places = [[-0.006, 0.0, -0.002], [0.01, 0.0, -0.002], [0.01, 0.008, -0.002], [0.03, 0.008, -0.004]]
+    path = ToolPath(np.array(places), feed=np.full(4, FEED))
+    removal = remove_along(TOOL, path, field_of(TOOL, (np.array([0.0, -0.02, -0.01]), np.array([0.03, 0.02, 0.0])), cell=0.5e-3), 1e-3)
+    told: list[tuple[int, int]] = []
+
+    def elsewhere(function: Callable[[Any], Any], tasks: Iterable[Any]) -> list[Any]:
+        return [pickle.loads(pickle.dumps(function))(pickle.loads(pickle.dumps(each))) for each in tasks]
+
+    change = question()
+    stations = stations_along(change.machine, TOOL, removal.path)
+    here = cuts_along(change, removal.path, removal.engagement, stations, lambda done, total: told.append((done, total)))
+    there = cuts_along(change, removal.path, removal.engagement, stations, map_=elsewhere)
+    assert told[-1] == (here.groups, here.groups)
+    assert here.cutting.any()
+    for name in ("margin", "margin_low", "chatter_frequency", "mean_force", "peak_force", "deflection", "form_error"):
+        np.testing.assert_array_equal(getattr(there, name), getattr(here, name))
+    assert there.warnings == here.warnings
 
 
 def test_engagements_are_as_plain_as_they_are() -> None:
