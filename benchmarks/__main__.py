@@ -83,6 +83,7 @@ STUDIES = (
     "frozen",
     "walks",
     "program",
+    "page_waits",
 )
 
 

@@ -6,6 +6,8 @@ import { answers, standing } from "./change_answers.js";
 import { results } from "./change_results.js";
 import { notComputed } from "./headline.js";
 
+/** Pause after which what was typed is asked [ms]. */
+const TYPING = 250;
 const BEFORE = "What stands below answers the question before.";
 
 /**
@@ -102,7 +104,8 @@ export function lobesBench({ form, toolings, query, keep, wanted = "" }) {
       mark(false);
       return void (found.childElementCount && told.say(`${BEFORE} “Compute” asks this one.`));
     }
-    timer = setTimeout(begin, now ? 0 : 450);
+    // digits of one number follow each other faster
+    timer = setTimeout(begin, now ? 0 : TYPING);
   }
 
   form.element.addEventListener("submit", busy(form.button, compute));
