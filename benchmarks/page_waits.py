@@ -1,8 +1,8 @@
 """How long people wait for the page: from a click to what follows it, in a real browser on a service with warm kernels.
 
-``python -m benchmarks page_waits``: the example from an empty page to a best speed; then questions of a tooling that was never cut, one field
-changed at a time: seconds until the lobes of the new question are drawn, and until its exact recommended cut stands. Service and browser
-(Debian's Chromium, headless) share the cores.
+``python -m benchmarks page_waits``: the example from an empty page to a best speed; then questions of a tooling that was never cut, one
+field changed at a time: seconds until the lobes of the new question are drawn, and until its exact recommended cut stands. Service and
+browser (Debian's Chromium, headless) share the cores.
 """
 
 from __future__ import annotations

@@ -95,8 +95,9 @@ def looked_at(change: ToolChange, engaged: PathEngagement, path: ToolPath, found
         lobes = one.limits(max_depth=FARTHEST * depth)
         both = np.array([lobes.limit_depth[0], lobes.limit_quantile(HELD)[0]]) / depth
         apart.append(np.abs(np.array([found.margin[move], found.margin_low[move]]) / both - 1.0))
-    median, largest = np.median(apart, axis=0), np.max(apart, axis=0)
-    return f"{near.size} cuts next to one, beside lobes with {change.draws} period maps: margins {median[0]:.1e} (at most {largest[0]:.1e}), lower ones {median[1]:.1e} ({largest[1]:.1e})"
+    (margin, low), (most_margin, most_low) = np.median(apart, axis=0), np.max(apart, axis=0)
+    apart_by = f"margins differ by {margin:.1e} (at most {most_margin:.1e}), lower ones by {low:.1e} ({most_low:.1e})"
+    return f"{near.size} cuts next to one, beside lobes with {change.draws} drawn machines' period maps: {apart_by}"
 
 
 def told(found: CutsAlong) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple
@@ -73,37 +74,50 @@ def judged(
     """Return what a tool does in each cut.
 
     `questions`: one for each place: any of its cuts, at its speed
-    `map_`: over the tips, then over tasks of some cuts
+    `map_`: over places with few cuts, and over tasks of some cuts of a place with many: what a tip leaves open is kept of one at a time
     `progress`: told how many cuts are done, and of how many
     """
-    places = list(map_(_place, questions))
-    tasks = _tasks(places, cuts, range(len(cuts)))
     answers: dict[int, CutAnswer] = {}
-    for which, found in zip(tasks, map_(_judged, tasks.values()), strict=True):
-        answers |= zip(which, found, strict=True)
+
+    def known(which: Sequence[int], found: Sequence[CutAnswer]) -> None:
+        answers.update(zip(which, found, strict=True))
         if progress is not None:
             progress(len(answers), len(cuts))
-    doubtful = [k for k, cut in enumerate(cuts) if places[cut.place].asked.doubtful(cut.process, answers[k].margin)]
-    again = {cuts[k].place: cuts[k].process for k in reversed(doubtful)}
-    for at, tip in zip(again, map_(_with_drawn_modes, [(places[at].asked, process) for at, process in again.items()]), strict=True):
-        places[at] = places[at]._replace(asked=tip)
-    tasks = _tasks(places, cuts, doubtful, answers)
-    for which, margins in zip(tasks, map_(_settled, tasks.values()), strict=True):
-        answers |= {k: answers[k]._replace(margin=margin) for k, margin in zip(which, margins, strict=True)}
+
+    of_place: dict[int, list[int]] = {}
+    for k, cut in enumerate(cuts):
+        of_place.setdefault(cut.place, []).append(k)
+    few = {at: own for at, own in of_place.items() if len(own) <= _TOGETHER}
+    for own, found in zip(few.values(), map_(_whole, [(questions[at], [cuts[k] for k in own]) for at, own in few.items()]), strict=True):
+        known(own, found)
+    for at, own in of_place.items():
+        if at in few:
+            continue
+        place = _place(questions[at])
+        parts = [own[i : i + _TOGETHER] for i in range(0, len(own), _TOGETHER)]
+        for which, found in zip(parts, map_(_judged, [_Task(place, [cuts[k] for k in which]) for which in parts]), strict=True):
+            known(which, found)
+        answers |= zip(own, _settled(place, [cuts[k] for k in own], [answers[k] for k in own], map_), strict=True)
     return [answers[k] for k in range(len(cuts))]
 
 
-def _tasks(
-    places: Sequence[_Place], cuts: Sequence[Cut], which: Sequence[int], known: dict[int, CutAnswer] | None = None
-) -> dict[tuple[int, ...], _Task]:
-    """Some cuts of one place each, by their numbers."""
-    of_place: dict[int, list[int]] = {}
-    for k in which:
-        of_place.setdefault(cuts[k].place, []).append(k)
-    parts = [(at, own[i : i + _TOGETHER]) for at, own in of_place.items() for i in range(0, len(own), _TOGETHER)]
-    return {
-        tuple(own): _Task(places[at], [cuts[k] for k in own], [] if known is None else [known[k].margin for k in own]) for at, own in parts
-    }
+def _whole(task: tuple[ToolChange, Sequence[Cut]]) -> list[CutAnswer]:
+    """All cuts of a place."""
+    question, cuts = task
+    place = _place(question)
+    return _settled(place, cuts, _judged(_Task(place, cuts)), map)
+
+
+def _settled(place: _Place, cuts: Sequence[Cut], answers: Sequence[CutAnswer], map_: Map) -> list[CutAnswer]:
+    """The answers with those lower margins settled that are doubtful."""
+    doubtful = [k for k, (cut, answer) in enumerate(zip(cuts, answers, strict=True)) if place.asked.doubtful(cut.process, answer.margin)]
+    if not doubtful:
+        return list(answers)
+    place = place._replace(asked=place.asked.with_drawn_modes(cuts[doubtful[0]].process))
+    parts = [doubtful[i : i + _TOGETHER] for i in range(0, len(doubtful), _TOGETHER)]
+    tasks = [_Task(place, [cuts[k] for k in which], [answers[k].margin for k in which]) for which in parts]
+    margins = dict(zip(doubtful, itertools.chain.from_iterable(map_(_settled_margins, tasks)), strict=True))
+    return [answer._replace(margin=margins.get(k, answer.margin)) for k, answer in enumerate(answers)]
 
 
 def _place(question: ToolChange) -> _Place:
@@ -118,11 +132,7 @@ def _judged(task: _Task) -> list[CutAnswer]:
     return [_answer(task.place, cut) for cut in task.cuts]
 
 
-def _with_drawn_modes(task: tuple[AskedTip, MillingProcess]) -> AskedTip:
-    return task[0].with_drawn_modes(task[1])
-
-
-def _settled(task: _Task) -> list[Margin]:
+def _settled_margins(task: _Task) -> list[Margin]:
     asked = task.place.asked
     return [asked.settled(cut.process, cut.depth, margin) for cut, margin in zip(task.cuts, task.margins, strict=True)]
 

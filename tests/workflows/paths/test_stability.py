@@ -22,6 +22,7 @@ from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.margins import FARTHEST
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.toolpath.path import RAPID, ToolPath
+from rcsa_ident.workflows.paths import judged_cuts
 from rcsa_ident.workflows.paths.removal import field_of, remove_along
 from rcsa_ident.workflows.paths.stability import CutsAlong, cuts_along, described, plain, stations_along
 from rcsa_ident.workflows.tool_change import ToolChange, surface_of
@@ -121,7 +122,8 @@ def test_two_layers_are_a_map_whose_margin_lies_between_those_of_its_layers() ->
     assert np.isnan(found.limit[-3])
 
 
-def test_the_answer_is_the_same_whatever_maps() -> None:
+@pytest.mark.parametrize("together", [64, 3])
+def test_the_answer_is_the_same_whatever_maps(together: int, monkeypatch: pytest.MonkeyPatch) -> None:
     places = [[-0.006, 0.0, -0.002], [0.01, 0.0, -0.002], [0.01, 0.008, -0.002], [0.03, 0.008, -0.004]]
     path = ToolPath(np.array(places), feed=np.full(4, FEED))
     removal = remove_along(TOOL, path, field_of(TOOL, (np.array([0.0, -0.02, -0.01]), np.array([0.03, 0.02, 0.0])), cell=0.5e-3), 1e-3)
@@ -133,6 +135,8 @@ def test_the_answer_is_the_same_whatever_maps() -> None:
     change = question()
     stations = stations_along(change.machine, TOOL, removal.path)
     here = cuts_along(change, removal.path, removal.engagement, stations, lambda done, total: told.append((done, total)))
+    # a place with few cuts is one task, one with many is several
+    monkeypatch.setattr(judged_cuts, "_TOGETHER", together)
     there = cuts_along(change, removal.path, removal.engagement, stations, map_=elsewhere)
     assert told[-1] == (here.groups, here.groups)
     assert here.cutting.any()
