@@ -342,6 +342,23 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def by_machine(rows: Sequence[dict[str, Any]]) -> str:
+    """Return a line for each machine: what the seed of the search changes."""
+    lines = [
+        "| machine, taken away | runs | error cut / same / other holder: median | least | worst | 90 % bands hold (least) | converged |"
+    ]
+    lines.append("|---|---|---|---|---|---|---|")
+    for seed, name in dict.fromkeys((row["machine"], row["ideal"]) for row in rows):
+        own = [row for row in rows if (row["machine"], row["ideal"]) == (seed, name)]
+        errors, bands = (np.array([[row[kind][key] for kind in KINDS] for row in own], dtype=float) for key in ("error", "band"))
+        middle, least, most = (" / ".join(f"{value:.3f}" for value in of(errors, axis=0)) for of in (np.median, np.min, np.max))
+        converged = sum(row["status"] == "converged" for row in own)
+        lines.append(
+            f"| {seed}, {name} | {len(own)} | {middle} | {least} | {most} | {100 * bands.mean():.0f} % ({100 * bands.min():.0f}) | {converged} |"
+        )
+    return "\n".join(lines)
+
+
 def main(arguments: Sequence[str]) -> None:
     """Run the machines and print the table."""
     parser = argparse.ArgumentParser(prog="benchmarks ideals", description=(__doc__ or "").partition("\n")[0])
@@ -367,6 +384,8 @@ def main(arguments: Sequence[str]) -> None:
         told = {kind: known[key][kind] for kind in KINDS}
         print(seed, name, search, known[key]["status"], told, known[key]["reasons"][:1], flush=True)
     print(f"\n{table(rows)}")
+    if given.searches > 1:
+        print(f"\n{by_machine(rows)}")
     for name in (each for each in given.ideals if ideals(given.level)[each].changes.of_the_machine):
         apart = [other_state(case_of(seed, ideals(given.level)[name], scratch), seed) for seed in given.machines]
         middle = " / ".join(f"{value:.3f}" for value in np.median(apart, axis=0))
