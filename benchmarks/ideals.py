@@ -352,10 +352,8 @@ def by_machine(rows: Sequence[dict[str, Any]]) -> str:
         own = [row for row in rows if (row["machine"], row["ideal"]) == (seed, name)]
         errors, bands = (np.array([[row[kind][key] for kind in KINDS] for row in own], dtype=float) for key in ("error", "band"))
         middle, least, most = (" / ".join(f"{value:.3f}" for value in of(errors, axis=0)) for of in (np.median, np.min, np.max))
-        converged = sum(row["status"] == "converged" for row in own)
-        lines.append(
-            f"| {seed}, {name} | {len(own)} | {middle} | {least} | {most} | {100 * bands.mean():.0f} % ({100 * bands.min():.0f}) | {converged} |"
-        )
+        held, converged = f"{100 * bands.mean():.0f} % ({100 * bands.min():.0f})", sum(row["status"] == "converged" for row in own)
+        lines.append(f"| {seed}, {name} | {len(own)} | {middle} | {least} | {most} | {held} | {converged} |")
     return "\n".join(lines)
 
 

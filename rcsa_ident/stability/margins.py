@@ -92,11 +92,11 @@ class AskedTip:
         if isinstance(tip, UncertainReceptance):
             drawn = draws_of(tip, process, draws, seed) if draws > 1 and tip.complete else None
             tip = tip.thinned()
-        nodes = directions_for(process, receptance_of(tip))
         # what draws others out of itself stays here: this goes to other processes
-        bare = Receptance(nodes.omega, nodes.values, nodes.rows, nodes.cols)
-        asked = known if method.needs == "modes" else receptance_of(known)
-        return cls(asked, bare, drawn, method, speed, None, (*said, *unusual_speeds(process, np.array([speed]))))
+        both = directions_for(process, receptance_of(tip)), receptance_of(known)
+        nodes, whole = (Receptance(each.omega, each.values, each.rows, each.cols) for each in both)
+        asked = known if method.needs == "modes" else whole
+        return cls(asked, nodes, drawn, method, speed, None, (*said, *unusual_speeds(process, np.array([speed]))))
 
     @property
     def speeds(self) -> FloatArray:
