@@ -345,9 +345,9 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
 def by_machine(rows: Sequence[dict[str, Any]]) -> str:
     """Return a line for each machine: what the seed of the search changes."""
     lines = [
-        "| machine, taken away | runs | error cut / same / other holder: median | least | worst | 90 % bands hold (least) | converged |"
+        "| machine, taken away | runs | error cut / same / other holder: median | least | worst | 90 % bands hold (least) | converged |",
+        "|---|---|---|---|---|---|---|",
     ]
-    lines.append("|---|---|---|---|---|---|---|")
     for seed, name in dict.fromkeys((row["machine"], row["ideal"]) for row in rows):
         own = [row for row in rows if (row["machine"], row["ideal"]) == (seed, name)]
         errors, bands = (np.array([[row[kind][key] for kind in KINDS] for row in own], dtype=float) for key in ("error", "band"))

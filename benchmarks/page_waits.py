@@ -26,9 +26,8 @@ IMMERSIONS = (31, 47, 12, 73, 8, 55, 22, 90)
 ONE = {f"RCSA_IDENT_{kind}_WORKERS": "1" for kind in ("JOB", "LOBE")}
 #: As long as anything may take [ms].
 _LONG = 600_000
-#: When the chart's data changed, on the page's own clock since the last input [ms].
+#: When the answer was no longer that before, on the page's own clock since the last input [ms].
 _WATCHED = """() => {
-  const plot = document.querySelector('.chart.lobes .plot');
   window.waits = { asked: 0, drawn: 0 };
   document.addEventListener('input', () => { window.waits = { asked: performance.now(), drawn: 0 }; }, true);
   new MutationObserver(() => {

@@ -15,7 +15,7 @@ from rcsa_ident.front.processes import EARLY, Workers, workers
 Processes = Annotated[
     int | None, typer.Option(min=1, max=64, help="Number of processes; default: one per core, at most 8.", show_default=False)
 ]
-DASK_HELP = "Dask scheduler (tcp://host:8786) to use instead of local processes; its workers find the campaign under the same path."
+DASK_HELP = "Dask scheduler (tcp://host:8786) to use instead of local processes; a campaign lies under the same path on its workers."
 Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help=DASK_HELP, show_default=False)]
 
 

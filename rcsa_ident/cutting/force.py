@@ -302,7 +302,7 @@ def force_history(
     parts = slices_of(cutter, depth, slices, engagement.radii, engagement.heights)
     arcs = engagement.arcs(parts.radius, parts.height)
     teeth, count = parts.lag.shape
-    block = max(1, _TOGETHER // angle.size)
+    block = max(1, _TOGETHER // max(angle.size, 1))
     for j, first in itertools.product(range(teeth), range(0, count, block)):
         own = slice(first, first + block)
         phi = np.mod(angle[:, None] + cutter.tooth_angle[j] - parts.lag[j, own], 2.0 * np.pi)

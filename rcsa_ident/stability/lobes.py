@@ -22,7 +22,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.stability.axial_doubt import axial_doubt
 from rcsa_ident.stability.discretisation import FullDiscretisation, SemiDiscretisation
-from rcsa_ident.stability.drawn_modes import drawn_tips, of_draw
+from rcsa_ident.stability.drawn_modes import DrawnTips, drawn_tips, of_draw
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.result import StabilityLobes
@@ -203,10 +203,8 @@ def _limits(
     return with_own_draws(found, tip, modes, process, draws, seed)
 
 
-def as_modes(tip: Receptance | TipModes) -> tuple[TipModes, str]:
-    """Return what stands for a tip where a method needs modes, and how well it does, in words; empty of modes."""
-    if isinstance(tip, TipModes):
-        return tip, ""
+def as_modes(tip: Receptance) -> tuple[TipModes, str]:
+    """Return the modes that stand for a tip where a method needs them, and how well they do, in words."""
     known = known_modes(tip)
     modes, error = fitted_modes(tip) if known is None else known
     share = f"{100.0 * error:.2g}" if error > 1e-4 else "less than 0.01"
@@ -278,8 +276,13 @@ def with_own_draws(
     whole = np.array([limit * np.exp(np.interp(speeds[order], own, each)) for each in ratio])
     limits = np.empty_like(whole)
     limits[:, order] = np.where(whole < deepest * (1.0 - 1e-9), whole, np.inf)
+    return replace(known, drawn=limits, warnings=(*known.warnings, *left_by_modes(tips)))
+
+
+def left_by_modes(tips: DrawnTips) -> tuple[str, ...]:
+    """Return a sentence where drawn machines as modes are far from their receptances."""
     rough = f"modes leave up to {100.0 * tips.error:.2g} % of the receptances of drawn machines: the band is as rough as that"
-    return replace(known, drawn=limits, warnings=(*known.warnings, *([rough] if tips.error > ROUGH_FIT else [])))
+    return (rough,) if tips.error > ROUGH_FIT else ()
 
 
 def _telling(speeds: FloatArray, limit: FloatArray) -> NDArray[np.intp]:
@@ -301,6 +304,7 @@ class Draws(NamedTuple):
 
 
 def draws_of(tip: UncertainReceptance, process: MillingProcess, draws: int, seed: int) -> Draws:
+    """Return tips drawn from a spread, in the directions that count for a cut, each with cutting coefficients of its own."""
     nodes, known = tip.thinned(), process.coefficients
     wanted = TIP if process.is_plain else known_directions(nodes)
     tips = embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes, wanted)

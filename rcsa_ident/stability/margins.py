@@ -14,7 +14,16 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.stability.drawn_modes import DrawnTips, drawn_tips, of_draw
 from rcsa_ident.stability.first_instability import first_loss
-from rcsa_ident.stability.lobes import Draws, affordable, as_modes, directions_for, draws_of, stability_lobes, unusual_speeds
+from rcsa_ident.stability.lobes import (
+    Draws,
+    affordable,
+    as_modes,
+    directions_for,
+    draws_of,
+    left_by_modes,
+    stability_lobes,
+    unusual_speeds,
+)
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import BEFORE, ROUGH, Growth, Passage, dominant, islands_from, longest_step
@@ -91,6 +100,9 @@ class AskedTip:
             said.append(told)
         if isinstance(tip, UncertainReceptance):
             drawn = draws_of(tip, process, draws, seed) if draws > 1 and tip.complete else None
+            if drawn is not None and not process.is_plain:
+                # proportions are those of X and Y: the other directions would be most of what goes to other processes
+                drawn = drawn._replace(tips=np.ascontiguousarray(drawn.tips[..., :2, :2]))
             tip = tip.thinned()
         # what draws others out of itself stays here: this goes to other processes
         both = directions_for(process, receptance_of(tip)), receptance_of(known)
@@ -112,7 +124,8 @@ class AskedTip:
             # where no limit was found it is farther than that
             near = times if times < FARTHEST else max(times, min(simple, _FAR))
             low = min(times, float(held_by(near * np.minimum(shares, _FAR)[:, None], HELD)[0]))
-        return Margin(times, low, chatter, (*warnings, *process.remarks, *process.cutter.cylinder_remarks(times * depth), *self.said))
+        remarks = *process.remarks, *process.cutter.cylinder_remarks(times * depth)
+        return Margin(times, low, chatter, (*warnings, *remarks, *self.said))
 
     def _shares(self, process: MillingProcess, depth: float) -> tuple[float, FloatArray]:
         """The zero-order margin, and the limits of the drawn machines beside that one."""
@@ -121,7 +134,8 @@ class AskedTip:
 
     def _deeper(self, process: MillingProcess, depth: float) -> tuple[float, float, tuple[str, ...]]:
         """How many times as deep a cut becomes unstable, how it vibrates there, and what speaks against it."""
-        deepest = process.within_reach(FARTHEST * depth)
+        # the edge of a plain cut has no end
+        deepest = FARTHEST * depth
         if not isinstance(self.method, MonodromyMethod) or not isinstance(self.tip, TipModes):
             found = stability_lobes(self.tip, process, self.speeds, deepest, self.method, 0)
             return min(float(found.limit_depth[0]) / depth, FARTHEST), float(found.chatter_frequency[0]), found.warnings
@@ -131,18 +145,19 @@ class AskedTip:
         growth, passage = cache(Growth(cut, self.speed, step, ROUGH)), Passage(cut, self.speed, step)
         if growth(depth) < 0.0:
             # closely at first, where islands may stand, then in long steps
-            low, near = depth, min(NEAR * depth, deepest)
+            low, near = depth, NEAR * depth
             limit = first_loss(growth, depth, near, _TOLERANCE, careful_from=islands)
-            limit = first_loss(growth, near, deepest, _ROUGHLY, _LONG) if limit is None and near < deepest else limit
+            limit = first_loss(growth, near, deepest, _ROUGHLY, _LONG) if limit is None else limit
         else:
             low = min(_BELOW * float(_ZERO_ORDER.lobes(self.nodes, process, self.speeds, deepest).limit_depth[0]), 0.5 * depth)
             limit = first_loss(growth, low, depth, _TOLERANCE, careful_from=islands)
         high = deepest if limit is None else limit
         passes = passage(BEFORE * high) >= 0.0
         limit = first_loss(passage, low, high, _TOLERANCE) if passes else limit
+        said = (PASSING,) if passes else ()
         if limit is None:
-            return FARTHEST, np.nan, ()
-        return limit / depth, dominant(cut.multiplier(self.speed, limit, step, waves=True, residual=ROUGH)), (PASSING,) if passes else ()
+            return FARTHEST, np.nan, said
+        return limit / depth, dominant(cut.multiplier(self.speed, limit, step, waves=True, residual=ROUGH)), said
 
     def _stronger(self, process: MillingProcess, depth: float) -> tuple[float, float, tuple[str, ...]]:
         """How many times stronger the material may be."""
@@ -182,4 +197,5 @@ class AskedTip:
         known: MonodromyOperator = self.method.monodromy(self.tip, process)  # type: ignore[attr-defined]
         found = tips.limits(known, self.speeds, np.array([limit]), guess[:, None], FARTHEST * depth)[:, 0]
         moved = float(np.median(np.minimum(found, FARTHEST * depth) / guess))
-        return margin._replace(low=min(margin.low * moved, margin.times))
+        said = (*margin.warnings, *left_by_modes(self.tips))
+        return margin._replace(low=min(margin.low * moved, margin.times), warnings=said)

@@ -201,7 +201,7 @@ class ZeroOrder:
         middle : Receptance
             In the directions that count for the cut.
         tips : complex array, shape (d, n, r, r) [m/N]
-            At its frequencies, in these directions.
+            At its frequencies, in these directions or in X and Y alone.
         speed : float [rad/s]
         depth : float [m]
             Of a cut that changes along the edge: there it is the strength of the material that has a limit, and X and Y alone count.

@@ -16,10 +16,12 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.stability.discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import draws_of, stability_lobes
 from rcsa_ident.stability.margins import FARTHEST, HELD, AskedTip
+from rcsa_ident.stability.stability_map import stability_map
 from rcsa_ident.stability.strength import Search, strength
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.stability.zero_order import ZeroOrder
+from tests.stability.mills import ONE, RPM, mill, tip
 from tests.stability.test_lobes import oblique_tip
 
 DRAWS = 60
@@ -52,6 +54,15 @@ def test_a_margin_is_the_limit_over_the_depth(share, engagement, cutter):
     assert found.low == pytest.approx(min(float(wanted.limit_quantile(HELD)[0]) / depth, FARTHEST), rel=0.06)
     if found.times < FARTHEST:
         assert found.chatter_frequency == pytest.approx(float(wanted.chatter_frequency[0]), rel=0.01)
+
+
+def test_above_an_island_a_cut_is_stable_and_within_it_is_not():
+    process, modes, speed = mill(2, 0.05, "up", np.radians(30.0)), tip(ONE), 18_625.0 * RPM
+    found = stability_map(modes, process, np.array([speed]), np.linspace(0.1e-3, 8e-3, 80))
+    begins, ends, lost = found.crossing_depth
+    asked_here = AskedTip.of(modes, process, speed, FullDiscretisation(), 0)
+    for depth, limit in ((0.95 * begins, begins), (0.5 * (begins + ends), begins), (1.05 * ends, lost)):
+        assert asked_here.margin(process, depth).times == pytest.approx(limit / depth, rel=0.03)
 
 
 def test_doubtful_lower_margins_are_settled_by_period_maps():

@@ -141,10 +141,9 @@ def _answer(place: _Place, cut: Cut) -> CutAnswer:
     process, depth, speed = cut.process, cut.depth, place.asked.speed
     margin = place.asked.margin(process, depth)
     cutter = process.cutter
-    # teeth that are alike repeat each other
-    alike = cutter.teeth if cutter.equally_spaced and not cutter.offset else 1
-    instants = -(-_ANGLES // alike)
-    angle = 2.0 * np.pi * np.arange(instants) / (instants * alike)
+    # teeth that come round alike repeat each other
+    instants = -(-_ANGLES // cutter.symmetry)
+    angle = 2.0 * np.pi * np.arange(instants) / (instants * cutter.symmetry)
     force = force_history(cutter, process.conditions(speed, depth), process.coefficients, angle, _SLICES) * [1.0, 1.0, -1.0]
     # from the machine's axes into the feed's
     force[:, :2] = force[:, :2] @ process.machine_from_feed
