@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -103,9 +103,9 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         "tooling: median | 90 % band holds |",
         "|---|---|---|---|---|---|---|",
     ]
-    for kind in dict.fromkeys(KINDS.values()):
+    for kind in dict.fromkeys(_kind(name, row["toolings"][name]) for name in KINDS for row in rows):
         for exact in sorted({row["exact"] for row in rows}, reverse=True):
-            own = [row["toolings"][name] for row in rows if row["exact"] is exact for name, of in KINDS.items() if of == kind]
+            own = [of for row in rows if row["exact"] is exact for name, of in row["toolings"].items() if _kind(name, of) == kind]
             errors, floor, machines = (np.array([each[key] for each in own]) for key in ("errors", "floor", "machine"))
             bands = np.mean([each["bands"]["90"] for each in own])
             lines.append(
@@ -113,6 +113,12 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
                 f"{np.median(machines):.3f} | {100.0 * bands:.0f} % |"
             )
     return "\n".join(lines)
+
+
+def _kind(name: str, of: Mapping[str, Any]) -> str:
+    """What a tooling shares with those that cut: in the same holder a tool may be of their model or of one that never cut."""
+    of_model = ", tool of a model that cut" if of["same_tool"] else ", tool of another model"
+    return KINDS[name] + (of_model if KINDS[name] == "never cut, same holder" else "")
 
 
 def _digits(values: Sequence[float]) -> list[float]:

@@ -241,67 +241,89 @@ def march(state, motion, force, modes, layout, table, frozen, steps, prepared):
 
 
 @numba.njit(cache=True)
-def largest_of_hessenberg(hessenberg):
-    """The eigenvalue of largest magnitude of a small real Hessenberg matrix, and its unit vector.
+def _of_two(a, b, c, d):
+    """The eigenvalue of [[a, b], [c, d]] of largest magnitude, of a pair the one above the real axis."""
+    half, product = 0.5 * (a - d), b * c
+    inner = half * half + product
+    if inner < 0.0:
+        return complex(d + half, math.sqrt(-inner))
+    # the further one first: the difference of the other would lose digits
+    far = half + math.copysign(math.sqrt(inner), half)
+    one, other = d + far, d - product / far if far != 0.0 else d
+    return complex(one if abs(one) > abs(other) else other, 0.0)
 
-    Shifted QR steps by Givens rotations in complex arithmetic, the vector by inverse iteration.
-    """
-    n = hessenberg.shape[0]
-    a = np.empty((n, n), dtype=np.complex128)
-    size = 0.0
-    for i in range(n):
-        for j in range(n):
-            a[i, j] = hessenberg[i, j]
-            if j >= i - 1:
-                size = max(size, abs(hessenberg[i, j]))
-    cosines, sines = np.empty(n), np.empty(n, dtype=np.complex128)
-    value = 0.0j
-    last, tries = n - 1, 0
+
+@numba.njit(cache=True)
+def _largest_eigenvalue(a):
+    """The eigenvalue of largest magnitude of a real Hessenberg matrix, which is overwritten: double-shift QR steps [francis1962]."""
+    value, last, tries = 0.0j, a.shape[0] - 1, 0
     while last >= 0:
         start = last
         while start > 0 and abs(a[start, start - 1]) > 1e-15 * (abs(a[start, start]) + abs(a[start - 1, start - 1])) + 1e-300:
             start -= 1
-        if start == last:
-            if abs(a[last, last]) > abs(value):
-                value = a[last, last]
-            last, tries = last - 1, 0
+        if start >= last - 1:
+            found = complex(a[last, last], 0.0)
+            if start < last:
+                found = _of_two(a[start, start], a[start, last], a[last, start], a[last, last])
+            if abs(found) > abs(value):
+                value = found
+            last, tries = start - 1, 0
             continue
         if tries > 60:
             break
         tries += 1
-        # Wilkinson's shift; now and then another one, against cycles
-        half = 0.5 * (a[last - 1, last - 1] - a[last, last])
-        product = a[last - 1, last] * a[last, last - 1]
-        root = np.sqrt(half * half + product)
-        if half.real * root.real + half.imag * root.imag < 0.0:
-            root = -root
-        down = half + root
-        shift = a[last, last] - (product / down if down != 0.0 else 0.0j)
+        # both eigenvalues of the last two rows as shifts; now and then others, against cycles
+        total = a[last - 1, last - 1] + a[last, last]
+        product = a[last - 1, last - 1] * a[last, last] - a[last, last - 1] * a[last - 1, last]
         if tries % 11 == 10:
-            shift += abs(a[last, last - 1])
-        for k in range(start, last + 1):
-            a[k, k] -= shift
+            off = abs(a[last, last - 1]) + abs(a[last - 1, last - 2])
+            total, product = 1.5 * off, off * off
+        # the first column of the shifted square, then the bulge that it leaves below the diagonal
+        first, below = a[start, start], a[start + 1, start]
+        x = first * (first - total) + product + a[start, start + 1] * below
+        y, z = below * (first + a[start + 1, start + 1] - total), below * a[start + 2, start + 1]
         for k in range(start, last):
-            x, y = a[k, k], a[k + 1, k]
-            # not zero, for y is not, and hypot loses no small numbers
-            length = math.hypot(abs(x), abs(y))
-            c = abs(x) / length
-            turn = x / abs(x) if x != 0.0 else 1.0 + 0.0j
-            s = turn * y.conjugate() / length
-            cosines[k], sines[k] = c, s
+            third = k + 2 if k < last - 1 else k + 1
+            if k > start:
+                x, y, z = a[k, k - 1], a[k + 1, k - 1], a[k + 2, k - 1] if third > k + 1 else 0.0
+            size = max(abs(x), abs(y), abs(z))
+            if size == 0.0:
+                continue
+            x, y, z = x / size, y / size, z / size
+            length = math.copysign(math.sqrt(x * x + y * y + z * z), x)
+            if k > start:
+                a[k, k - 1], a[k + 1, k - 1] = -length * size, 0.0
+                if third > k + 1:
+                    a[third, k - 1] = 0.0
+            # the reflection 1 - u (1, v, w), whose last entry is zero in the last step
+            x += length
+            u0, u1, u2, v, w = x / length, y / length, z / length, y / x, z / x
             for j in range(k, last + 1):
-                u, v = a[k, j], a[k + 1, j]
-                a[k, j] = c * u + s * v
-                a[k + 1, j] = c * v - s.conjugate() * u
-        for k in range(start, last):
-            c, s = cosines[k], sines[k]
-            for i in range(start, min(k + 2, last) + 1):
-                u, v = a[i, k], a[i, k + 1]
-                a[i, k] = c * u + s.conjugate() * v
-                a[i, k + 1] = c * v - s * u
-        for k in range(start, last + 1):
-            a[k, k] += shift
-    column, vector = np.ones((n, 1), dtype=np.complex128), np.empty(n, dtype=np.complex128)
+                part = a[k, j] + v * a[k + 1, j] + w * a[third, j]
+                a[k, j] -= u0 * part
+                a[k + 1, j] -= u1 * part
+                a[third, j] -= u2 * part
+            for i in range(start, min(k + 3, last) + 1):
+                part = u0 * a[i, k] + u1 * a[i, k + 1] + u2 * a[i, third]
+                a[i, k] -= part
+                a[i, k + 1] -= v * part
+                a[i, third] -= w * part
+    return value
+
+
+@numba.njit(cache=True)
+def largest_of_hessenberg(hessenberg):
+    """The eigenvalue of largest magnitude of a small real Hessenberg matrix, and its unit vector by inverse iteration."""
+    n = hessenberg.shape[0]
+    value, size = _largest_eigenvalue(hessenberg.copy()), 0.0
+    a = np.empty((n, n), dtype=np.complex128)
+    for i in range(n):
+        for j in range(max(i - 1, 0), n):
+            size = max(size, abs(hessenberg[i, j]))
+    column, vector = np.empty((n, 1), dtype=np.complex128), np.empty(n, dtype=np.complex128)
+    # without any symmetry, so that it is orthogonal to no eigenvector: ones are to (1, -1, 1, -1, ...)
+    for i in range(n):
+        column[i, 0] = 0.5 + (i + 1) * 0.6180339887498949 % 1.0
     for _ in range(2):
         for i in range(n):
             for j in range(n):
