@@ -164,7 +164,13 @@ CASES = (
         "rough",
     ),
     study_case(
-        "rough drawings: truth within the 90 % band, toolings that cut", "_rough", 85.0, partial(rough_held, "cut"), "%", "rough", Measure.AT_LEAST
+        "rough drawings: truth within the 90 % band, toolings that cut",
+        "_rough",
+        85.0,
+        partial(rough_held, "cut"),
+        "%",
+        "rough",
+        Measure.AT_LEAST,
     ),
     study_case(
         "rough drawings: recommended cuts that hold over ±1 % of speed",
