@@ -115,10 +115,11 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _kind(name: str, of: Mapping[str, Any]) -> str:
-    """What a tooling shares with those that cut: in the same holder a tool may be of their model or of one that never cut."""
-    of_model = ", tool of a model that cut" if of["same_tool"] else ", tool of another model"
-    return KINDS[name] + (of_model if KINDS[name] == "never cut, same holder" else "")
+def _kind(name: str, tooling: Mapping[str, Any]) -> str:
+    """The kind of a tooling; in the same holder a tool may be of a model that cut or of another one."""
+    if name != "similar":
+        return KINDS[name]
+    return f"{KINDS[name]}, tool of {'a model that cut' if tooling['same_tool'] else 'another model'}"
 
 
 def _digits(values: Sequence[float]) -> list[float]:

@@ -175,7 +175,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         "|---|---|---|---|---|---|---|",
     ]
     for kind, names in KINDS.items():
-        for case, words in (("with", "accelerometers on it"), ("without", "nobody looks at it")):
+        for case, words in (("with", "accelerometers on it"), ("without", "no sensor on it")):
             found = [_kept(row, case) for row in rows if row["tooling"] in names]
             ratio, inside = (np.concatenate(each) for each in zip(*found, strict=True))
             error = np.abs(ratio - 1.0)
