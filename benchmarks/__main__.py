@@ -64,6 +64,7 @@ STUDIES = (
     "validation",
     "all",
     "labelled_cuts",
+    "labelled_cuts_hurco",
     "learn",
     "ring",
     "workpiece_side",

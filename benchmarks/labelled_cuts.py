@@ -2,8 +2,8 @@
 
 ``python -m benchmarks labelled_cuts --scratch FOLDER [--page]``. The cuts lie beside the project (118 of them, and the 40 of the published
 training set, 39 of which are among the 118: 79 are unseen). The numbers of the label model were chosen on the 40 alone, by leaving out
-one speed after the other (``--choose``). What is computed once, limits of draws of the prior by full discretisation at all tested
-speeds, is kept in the scratch folder.
+one speed after the other (``--choose``). What is computed once, margins of draws of the prior by full discretisation at all
+tested cuts, is kept in the scratch folder.
 """
 
 from __future__ import annotations
@@ -32,13 +32,18 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.front.processes import workers
 from rcsa_ident.stability.discretisation import FullDiscretisation
+from rcsa_ident.stability.labels.coverage import weight_of_labels
+from rcsa_ident.stability.labels.cut_margins import CutMargins, DrawnMargins, points_of
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, LabelPosterior, learn_labels
+from rcsa_ident.stability.labels.label_process import LabelProcess
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.next_test import most_telling
+from rcsa_ident.stability.labels.stacking import groups_of
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.labels.uncertain_tip import DrawnLimits, TipLimits, UncertainTip
+from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.workflows.learn_from_cuts import beside_physics
 
 CUTS, TRAINING = (FILES / f"labelled_cuts_{name}.csv" for name in ("118", "training_40"))
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "labelled_cuts.md"
@@ -81,22 +86,24 @@ def prior(softening: float = 0.0) -> UncertainTip:
     return UncertainTip.independent(TipModes.of(models), spreads, shares, softening)
 
 
-def limits_of(softening: float = 0.0) -> TipLimits:
-    """Limits of the prior's draws in the cut of all 118."""
-    process = MillingProcess(Cutter(2, 12e-3), CuttingCoefficients(COEFFICIENTS[0], COEFFICIENTS[1] / COEFFICIENTS[0]), DOWN)
-    return TipLimits(prior(softening), process, FullDiscretisation(tolerance=1e-2), 12e-3)
+PROCESS = MillingProcess(Cutter(2, 12e-3), CuttingCoefficients(COEFFICIENTS[0], COEFFICIENTS[1] / COEFFICIENTS[0]), DOWN)
+
+
+def margins_of(cuts: TestedCuts, softening: float = 0.0) -> CutMargins:
+    """Margins of the prior's draws at cuts."""
+    return CutMargins(prior(softening), PROCESS, FullDiscretisation(tolerance=1e-2), cuts)
 
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """Draws of the prior with their limits at all tested speeds; a draw that is new is computed.
+    """Draws of the prior with their margins at all cuts; those of a draw that is new are computed.
 
-    `z`, shape (d, size); `speeds` [rad/s], shape (n,); `log_limit`, shape (d, n); `softening` [s/rad]
+    `z`, shape (d, size); `cuts`: all, n of them; `margin`, shape (d, n); `softening` [s/rad]
     """
 
     z: FloatArray
-    speeds: FloatArray
-    log_limit: FloatArray
+    cuts: TestedCuts
+    margin: FloatArray
     softening: float = 0.0
     places: dict[bytes, int] = field(default_factory=dict)
 
@@ -104,91 +111,113 @@ class Pool:
         self.places.update({row.tobytes(): k for k, row in enumerate(np.ascontiguousarray(self.z))})
 
     @classmethod
-    def kept(cls, scratch: Path, speeds: FloatArray, softening: float = 0.0) -> Pool:
+    def kept(cls, scratch: Path, cuts: TestedCuts, softening: float = 0.0) -> Pool:
         """What the scratch folder holds, or what is computed now and kept there."""
-        path = scratch / f"labelled_cuts_pool{'_softening' if softening else ''}.npz"
-        limits = limits_of(softening)
-        z = np.random.default_rng(SEED).standard_normal((SOFT_POOL if softening else POOL, limits.tip.size))
+        path = scratch / f"labelled_cuts_margins{'_softening' if softening else ''}.npz"
+        margins = margins_of(cuts, softening)
+        z = np.random.default_rng(SEED).standard_normal((SOFT_POOL if softening else POOL, margins.tip.size))
         if path.exists():
-            return cls(z, speeds, np.load(path)["log_limit"], softening)
+            return cls(z, cuts, np.load(path)["margin"], softening)
         with workers(2) as pool:
-            parts = list(pool.map_many(partial(limits, speeds=speeds), np.array_split(z, len(z) // 20)))
-        log_limit = np.concatenate([part.log_limit for part in parts])
-        np.savez(path, log_limit=log_limit)
-        return cls(z, speeds, log_limit, softening)
+            margin = np.concatenate([part.margin for part in pool.map_many(margins, np.array_split(z, len(z) // 20))])
+        np.savez(path, margin=margin)
+        return cls(z, cuts, margin, softening)
 
-    def __call__(self, z: FloatArray, speeds: FloatArray) -> DrawnLimits:
-        """Limits of draws at some of the speeds."""
+    def margins(self, some: FloatArray, z: FloatArray) -> DrawnMargins:
+        """Margins of draws at some of the cuts."""
         rows = [self.places.get(row.tobytes()) for row in np.ascontiguousarray(z)]
-        columns = np.searchsorted(self.speeds, speeds * (1.0 - 1e-9))
         if None in rows:
-            return limits_of(self.softening)(z, speeds)
-        found = self.log_limit[np.array(rows)[:, None], columns]
-        return DrawnLimits(found, np.full(found.shape, np.nan))
+            return margins_of(self.cuts.at_places(some), self.softening)(z)
+        found = self.margin[np.array(rows)[:, None], some]
+        return DrawnMargins(found, np.full(found.shape, np.nan))
 
-    def learnt(self, cuts: TestedCuts, model: LabelModel, seed: int = 1, effort: Effort | None = None) -> LabelPosterior:
-        """What labels teach: by default from the pool's draws alone, which costs no limit."""
+    def learnt(self, some: FloatArray, model: LabelModel, seed: int = 1, effort: Effort | None = None) -> Taught:
+        """What the labels of some cuts teach: by default from the pool's draws alone, which costs no margin."""
         effort = effort or Effort(further=0, rounds=0, kept=KEPT)
         first = self.z if effort.rounds == 0 else self.z[: effort.first]
-        return learn_labels(self, self.z.shape[1], cuts, model, np.random.default_rng(seed), effort, first)
+        cuts, rng = self.cuts.at_places(some), np.random.default_rng(seed)
+        groups = groups_of(cuts)
+        groups = groups if len(groups) > 1 else []
+        size = self.z.shape[1]
+        found = learn_labels(partial(self.margins, some), size, cuts, points_of(cuts, PROCESS), model, rng, effort, first, groups)
+        return Taught(found, *(beside_physics(cuts, PROCESS, found, groups, rng)[:2] if some.size else (None, 1.0)))
 
-    def stable(self, found: LabelPosterior, model: LabelModel, cuts: TestedCuts) -> FloatArray:
-        """Probability of each draw that each cut is called stable, shape (r, n)."""
-        speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
-        drawn = self(found.z, speeds).log_limit + found.errors(model.discrepancy, speeds)
-        return model.noise.stable(drawn[:, place] - np.log(cuts.axial_depth))
+    def stable(self, found: LabelPosterior, model: LabelModel, some: FloatArray) -> FloatArray:
+        """Probability of each draw that some of the cuts are called stable, by physics, shape (r, n)."""
+        points, place = np.unique(points_of(self.cuts.at_places(some), PROCESS), axis=0, return_inverse=True)
+        return model.noise.stable(self.margins(some, found.z).margin + found.errors(model.discrepancy, points)[:, place])
+
+    def told(self, found: Taught, model: LabelModel, some: FloatArray) -> FloatArray:
+        """Probability that some of the cuts are called stable, as `learn` tells it, shape (n,)."""
+        physics = self.stable(found.posterior, model, some).mean(axis=0)
+        if found.without is None:
+            return np.asarray(physics)
+        without, near = found.without.told(found.without.features_of(self.cuts.at_places(some), PROCESS))
+        weight = (1.0 - found.trust) * weight_of_labels(near)
+        return np.asarray((1.0 - weight) * physics + weight * without)
 
 
-def chosen_on(pool: Pool, training: TestedCuts) -> list[tuple[float, float, float, float]]:
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """What labels taught, with and without physics, and the weight of physics."""
+
+    posterior: LabelPosterior
+    without: LabelProcess | None
+    trust: float
+
+
+def chosen_on(pool: Pool, learnt: FloatArray) -> list[tuple[float, float, float, float]]:
     """(log score, deviation, length, width), the best first: each speed of the 40 told from the others, no other cut looked at."""
-    speeds, place = np.unique(training.spindle_speed, return_inverse=True)
-    number = np.random.default_rng(5).standard_normal((40, speeds.size))
-    tips = pool(pool.z, speeds)
+    cuts = pool.cuts.at_places(learnt)
+    points, place = np.unique(points_of(cuts, PROCESS), axis=0, return_inverse=True)
+    number = np.random.default_rng(5).standard_normal((40, len(points)))
+    tips = pool.margins(learnt, pool.z).margin
     found = []
     for deviation, length, width in itertools.product(*GRID):
-        error = number @ LimitDiscrepancy(deviation, length).root(speeds).T
+        error = number @ LimitDiscrepancy(deviation, length).root(points).T
         noise = LabelNoise(width=width, wrong=WRONG)
-        each = np.empty((len(training.verdict), len(tips.log_limit), len(error)), dtype=np.float32)
+        each = np.empty((learnt.size, len(tips), len(error)), dtype=np.float32)
         for k, at in enumerate(place):
-            margin = tips.log_limit[:, at, None] + error[:, at] - np.log(training.axial_depth[k])
-            each[k] = np.log(noise.stable(margin if training.verdict[k] is Verdict.STABLE else -margin))
+            margin = tips[:, k, None] + error[:, at]
+            each[k] = np.log(noise.stable(margin if cuts.verdict[k] is Verdict.STABLE else -margin))
         total, told = each.sum(axis=0), []
-        for at in range(speeds.size):
+        for at in range(len(points)):
             left = total - each[place == at].sum(axis=0)
             told += [float(logsumexp(left + own) - logsumexp(left)) for own in each[place == at]]
         found.append((float(np.mean(told)), deviation, length, width))
     return sorted(found, reverse=True)
 
 
-def random_orders(pool: Pool, cuts: TestedCuts, model: LabelModel) -> dict[int, tuple[Score, Score]]:
+def random_orders(pool: Pool, model: LabelModel) -> dict[int, tuple[Score, Score]]:
     """Scores over all cuts, and over those that were not learnt from, by the number of labels in ten random orders."""
     found: dict[int, list[tuple[Score, Score]]] = {n: [] for n in LABELS}
     for seed in range(ORDERS):
-        order = np.random.default_rng(100 + seed).permutation(len(cuts.verdict))
+        order = np.random.default_rng(100 + seed).permutation(len(pool.cuts.verdict))
         for n in LABELS:
-            found[n].append(scores_after(pool, cuts, order[:n], model))
+            found[n].append(scores_after(pool, order[:n], model))
     return {n: (Score.mean([a for a, _ in each]), Score.mean([b for _, b in each])) for n, each in found.items()}
 
 
-def scores_after(pool: Pool, cuts: TestedCuts, learnt: FloatArray, model: LabelModel) -> tuple[Score, Score]:
+def scores_after(pool: Pool, learnt: FloatArray, model: LabelModel) -> tuple[Score, Score]:
     """Score over all cuts and over those that were not learnt from."""
-    probability = pool.stable(pool.learnt(cuts.at_places(np.array(learnt, dtype=np.intp)), model), model, cuts).mean(axis=0)
-    left = np.setdiff1d(np.arange(len(cuts.verdict)), learnt)
-    return Score.of(probability, cuts), Score.of(probability[left], cuts.at_places(left))
+    every = np.arange(len(pool.cuts.verdict))
+    probability = pool.told(pool.learnt(np.array(learnt, dtype=np.intp), model), model, every)
+    left = np.setdiff1d(every, learnt)
+    return Score.of(probability, pool.cuts), Score.of(probability[left], pool.cuts.at_places(left))
 
 
-def chosen_by_program(pool: Pool, cuts: TestedCuts, model: LabelModel, most: int = 40) -> dict[int, tuple[Score, Score]]:
+def chosen_by_program(pool: Pool, model: LabelModel, most: int = 40) -> dict[int, tuple[Score, Score]]:
     """The same where each next cut is the one among all that tells most after the labels so far."""
     chosen: list[int] = []
     found = {}
     while True:
+        so_far = np.array(chosen, dtype=np.intp)
         if len(chosen) in LABELS:
-            found[len(chosen)] = scores_after(pool, cuts, np.array(chosen, dtype=np.intp), model)
+            found[len(chosen)] = scores_after(pool, so_far, model)
         if len(chosen) == most:
             return found
-        posterior = pool.learnt(cuts.at_places(np.array(chosen, dtype=np.intp)), model)
-        left = np.setdiff1d(np.arange(len(cuts.verdict)), chosen)
-        stable = pool.stable(posterior, model, cuts.at_places(left))
+        left = np.setdiff1d(np.arange(len(pool.cuts.verdict)), chosen)
+        stable = pool.stable(pool.learnt(so_far, model).posterior, model, left)
         chosen.append(int(left[most_telling(stable, 1, np.random.default_rng(1))[0]]))
 
 
@@ -204,6 +233,11 @@ def calibration(
     return rows
 
 
+def _without(found: Taught, cuts: TestedCuts) -> FloatArray:
+    assert found.without is not None
+    return found.without.told(found.without.features_of(cuts, PROCESS))[0]
+
+
 def main(arguments: Sequence[str]) -> None:
     """Print all, and write the page."""
     parser = argparse.ArgumentParser(prog="benchmarks labelled_cuts", description=__doc__)
@@ -215,17 +249,27 @@ def main(arguments: Sequence[str]) -> None:
     if not CUTS.exists():
         print("the labelled cuts are not beside the project")
         return
+    # one cut of the training set is not among the 118
     cuts, training, model = read(CUTS), read(TRAINING), LabelModel()
-    pool = Pool.kept(given.scratch, np.unique(cuts.spindle_speed))
+    everywhere = cuts.joined(training)
+    pool, every = Pool.kept(given.scratch, everywhere), np.arange(len(cuts.verdict))
+    learnt = np.flatnonzero(~unseen(everywhere, training))
     if given.choose:
-        for score, deviation, length, width in chosen_on(pool, training)[:12]:
+        for score, deviation, length, width in chosen_on(pool, learnt)[:12]:
             print(f"log score {score:.3f}: deviation {deviation:g}, length {length:g}, width {width:g}")
         return
     aside, start = unseen(cuts, training), time.process_time()
-    found = pool.learnt(training, model, effort=Effort())
+    found = pool.learnt(learnt, model, effort=Effort())
     seconds = time.process_time() - start
-    probability = pool.stable(found, model, cuts).mean(axis=0)
-    before = pool.stable(pool.learnt(TestedCuts.none(), model), model, cuts).mean(axis=0)
+    probability = pool.told(found, model, every)
+    none = np.zeros(0, dtype=np.intp)
+    before = pool.told(pool.learnt(none, model), model, every)
+    for name, each in (
+        ("physics alone", pool.stable(found.posterior, model, every).mean(axis=0)),
+        ("labels without physics", _without(found, cuts)),
+    ):
+        print(f"{name}: all {Score.of(each, cuts)}; unseen {Score.of(each[aside], cuts.at_places(np.flatnonzero(aside)))}")
+    print(f"weight of physics {found.trust:.2f}")
     rest = cuts.at_places(np.flatnonzero(aside))
     told: Mapping[str, Any] = {
         "before": (Score.of(before, cuts), Score.of(before[aside], rest)),
@@ -233,25 +277,23 @@ def main(arguments: Sequence[str]) -> None:
     }
     for name, (whole, part) in told.items():
         print(f"{name}: all {whole}; unseen {part}")
-    print(f"effective draws {found.effective:.0f}, {seconds:.0f} s of one core")
-    orders = random_orders(pool, cuts, model)
+    print(f"effective draws {found.posterior.effective:.0f}, {seconds:.0f} s of one core")
+    own = Pool(pool.z, cuts, pool.margin[:, : every.size])
+    orders = random_orders(own, model)
     for n, (whole, part) in orders.items():
         print(f"{n} random labels: all {whole}; not learnt {part}")
-    chosen = chosen_by_program(pool, cuts, model)
+    chosen = chosen_by_program(own, model)
     for n, (whole, part) in chosen.items():
         print(f"{n} chosen labels: all {whole}; not learnt {part}")
-    soft = Pool.kept(given.scratch, pool.speeds, SOFTENING)
-    softened = soft.learnt(training, model)
-    plain = pool.learnt(training, model)
-    share = soft.stable(softened, model, cuts).mean(axis=0)
-    unsoftened = pool.stable(plain, model, cuts).mean(axis=0)
-    softening = {
-        "without": (plain.log_evidence, Score.of(unsoftened, cuts), Score.of(unsoftened[aside], rest)),
-        "with": (softened.log_evidence, Score.of(share, cuts), Score.of(share[aside], rest)),
-    }
-    everything = {"without": pool.learnt(cuts, model).log_evidence, "with": soft.learnt(cuts, model).log_evidence}
+    soft = Pool.kept(given.scratch, everywhere, SOFTENING)
+    softening, everything = {}, {}
+    for name, each_pool in (("without", pool), ("with", soft)):
+        taught = each_pool.learnt(learnt, model).posterior
+        share = each_pool.stable(taught, model, every).mean(axis=0)
+        softening[name] = (taught.log_evidence, Score.of(share, cuts), Score.of(share[aside], rest))
+        everything[name] = each_pool.learnt(every, model).posterior.log_evidence
     for name, (evidence, whole, part) in softening.items():
         print(f"softening {name}: log evidence of the 40 {evidence:.2f}, of the 118 {everything[name]:.2f}; all {whole}; unseen {part}")
     if given.page:
         curves = (calibration(probability, cuts), calibration(probability[aside], rest))
-        write_page(PAGE, Findings(told, orders, chosen, softening, everything, curves, found.effective, seconds, model))
+        write_page(PAGE, Findings(told, orders, chosen, softening, everything, curves, found.posterior.effective, seconds, model))

@@ -200,8 +200,10 @@ def tell_lobes(
     """Write and print the stability lobes of what is asked about, and what is recommended; options as of `lobes`, lengths in metres."""
     from rcsa_ident.io.curves.lobes import write_lobes, write_map
     from rcsa_ident.io.settings.tested_cuts import read_tested_cuts, write_tests
+    from rcsa_ident.machine.learnt_tip import LearntTip
+    from rcsa_ident.stability.labels.coverage import uncovered
     from rcsa_ident.workflows.advise import advise
-    from rcsa_ident.workflows.tool_change import map_of, probabilities_stable, surface_of
+    from rcsa_ident.workflows.tool_change import map_of, surface_of, tested_answers
 
     stages = Stages(quiet=json_)
     with stages.stage("lobes"):
@@ -217,7 +219,10 @@ def tell_lobes(
     write_lobes(out, found, surface, advice.usable.stable, advice.preview)
     if tests_out is not None and cuts is not None:
         with stages.stage("tests"):
-            write_tests(tests_out, cuts, probabilities_stable(change, cuts))
+            answers = tested_answers(change, cuts)
+            write_tests(tests_out, cuts, answers)
+        if isinstance(change.machine, LearntTip):
+            remarks += uncovered(change.machine.cuts, cuts, change.process, answers.covered)
     if plot is not None:
         from rcsa_ident.report.lobes import Judged, save_figure, stability_figure
 

@@ -15,16 +15,28 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.setup.tooling import Tooling
+from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers, covered, weight_of_labels
+from rcsa_ident.stability.labels.cut_margins import CutMargins, points_of
 from rcsa_ident.stability.labels.label_posterior import FEWEST, LabelModel, LabelPosterior
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts
+from rcsa_ident.stability.labels.label_process import LabelProcess
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 
+#: Draws of what was believed before labels, and their seed.
+_BEFORE, _SEED = 200, 1
 #: What is said of a posterior that few draws stand for.
 THIN = "only {:.0f} of the draws agree with the labels, fewer than {:.0f}: probabilities are rough"
+
+#: What is said where the labels alone are the better explanation, by so much of the log evidence.
+WORSE = (
+    "a smooth process without physics explains the labels better (log evidence {:.0f}, physics {:.0f}): limits of this tip are not to be "
+    "trusted away from the labels"
+)
+_BETTER = 10.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,6 +46,9 @@ class LearntTip(TipSource):
     `coefficients`: means before the labels
     `method`: that the limits were computed by: their error is that method's, too, so that no other one takes its place
     `cuts`: those that were learnt from
+    `process`: the labels without physics; None without labels
+    `trust`: weight of physics beside that process, as cuts told it that neither had seen
+    `scores`: mean logarithm of the probability of those cuts' labels, by physics and without it; empty where no cuts could be left out
     """
 
     prior: UncertainTip
@@ -42,6 +57,9 @@ class LearntTip(TipSource):
     model: LabelModel
     cuts: TestedCuts
     posterior: LabelPosterior
+    process: LabelProcess | None = None
+    trust: float = 1.0
+    scores: tuple[float, ...] = ()
 
     @property
     def band(self) -> None:
@@ -55,8 +73,11 @@ class LearntTip(TipSource):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Labels that contradict each other, and a posterior that few draws stand for."""
-        return (*self.cuts.contradictions, *([THIN.format(self.posterior.effective, FEWEST)] if self.thin else []))
+        """Labels that contradict each other, a posterior that few draws stand for, and physics that tells less than labels alone."""
+        said = [THIN.format(self.posterior.effective, FEWEST)] if self.thin else []
+        if self.process is not None and self.process.log_evidence - self.posterior.log_evidence > _BETTER:
+            said.append(WORSE.format(self.process.log_evidence, self.posterior.log_evidence))
+        return (*self.cuts.contradictions, *said)
 
     @property
     def thin(self) -> bool:
@@ -89,7 +110,8 @@ class LearntTip(TipSource):
         """Return limits of the first draws, their errors included, shape (draws, n) [m], and the chatter frequencies [rad/s]."""
         limits = TipLimits(self.prior, process, self.method, max_depth)(self.posterior.z[:draws], speeds)
         places = np.unique(speeds, return_inverse=True)
-        error = self.posterior.errors(self.model.discrepancy, places[0])[:draws, places[1]]
+        asked = TestedCuts(places[0], np.ones(places[0].size), (Verdict.MARGINAL,) * places[0].size)
+        error = self.posterior.errors(self.model.discrepancy, points_of(asked, process))[:draws, places[1]]
         # beyond the largest depth nothing was looked for, and no error makes a limit of it
         found = np.where(limits.log_limit < np.log(max_depth) - 1e-9, np.exp(limits.log_limit + error), np.inf)
         return found, limits.chatter
@@ -114,15 +136,41 @@ class LearntTip(TipSource):
         return StabilityLobes(speeds, middle, heard, lobe, max_depth, self.method.name, drawn=drawn)
 
     def stable_by_draw(self, process: MillingProcess, cuts: TestedCuts) -> FloatArray:
-        """Return the probability of each draw that each cut is called stable, shape (r, n)."""
-        speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
-        deepest = 4.0 * float(cuts.axial_depth.max())
-        drawn, _ = self.drawn_limits(process, speeds, deepest, len(self.posterior.z))
-        return self.model.noise.stable(np.log(np.minimum(drawn, deepest))[:, place] - np.log(cuts.axial_depth))
+        """Return the probability of each draw that each cut is called stable, by physics alone, shape (r, n)."""
+        margins = CutMargins(self.prior, process, self.method, cuts)
+        points, place = np.unique(margins.points, axis=0, return_inverse=True)
+        error = self.posterior.errors(self.model.discrepancy, points)[:, place]
+        return self.model.noise.stable(margins(self.posterior.z).margin + error)
+
+    def answers(self, process: MillingProcess, cuts: TestedCuts) -> TestedAnswers:
+        """Return what is believed of cuts: by physics and by the labels alone, and whether labels cover them.
+
+        Where labels end it is that of physics, and in a direction that has none what was believed before the first label.
+
+        `process`: of what a cut does not tell of itself
+        """
+        found = self.stable_by_draw(process, cuts).mean(axis=0)
+        if self.process is None:
+            return TestedAnswers(found, (Covered.NO,) * found.size)
+        without, near = self.process.told(self.process.features_of(cuts, process))
+        weight = (1.0 - self.trust) * weight_of_labels(near)
+        found = (1.0 - weight) * found + weight * without
+        cover = covered(self.cuts, cuts, process, near)
+        outside = ~np.isin(points_of(cuts, process)[:, 2], self.posterior.points[:, 2])
+        if outside.any():
+            found[outside] = self._before(process, cuts.at_places(np.flatnonzero(outside)))
+        return TestedAnswers(found, cover)
 
     def probabilities(self, process: MillingProcess, cuts: TestedCuts) -> FloatArray:
-        """Return the probability that each cut is called stable, shape (n,): the mean over all draws."""
-        found: FloatArray = self.stable_by_draw(process, cuts).mean(axis=0)
+        """Return the probability that each cut is called stable, shape (n,)."""
+        return self.answers(process, cuts).stable
+
+    def _before(self, process: MillingProcess, cuts: TestedCuts) -> FloatArray:
+        """The same before the first label."""
+        z = np.random.default_rng(_SEED).standard_normal((_BEFORE, self.prior.size))
+        margin = CutMargins(self.prior, process, self.method, cuts)(z).margin
+        error = self.model.discrepancy.deviation * np.random.default_rng(_SEED).standard_normal(margin.shape)
+        found: FloatArray = self.model.noise.stable(margin + error).mean(axis=0)
         return found
 
     def __str__(self) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -18,10 +18,13 @@ from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, learn_labels
+from rcsa_ident.stability.labels.cut_margins import CutMargins, DrawnMargins
+from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, LabelPosterior, learn_labels
+from rcsa_ident.stability.labels.label_process import LabelProcess
 from rcsa_ident.stability.labels.next_test import most_telling
+from rcsa_ident.stability.labels.stacking import groups_of, log_score, stable_share, trust_in
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.labels.uncertain_tip import DrawnLimits, TipLimits, UncertainTip
+from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.lobes import both_directions
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.tip_modes import TipModes, fitted_modes
@@ -31,8 +34,6 @@ from rcsa_ident.stability.tip_modes import TipModes, fitted_modes
 TAPPED = (0.02, 0.2, 0.15)
 #: Modes below this share of the strongest one's peak are taken as they were tapped.
 _STRONG = 0.05
-#: How much deeper than the deepest test limits are looked for.
-_DEEPER = 4.0
 #: Draws of one task.
 _TASK = 20
 #: Speeds and depths among which tests are proposed where no table names them.
@@ -107,17 +108,38 @@ def learn_from_cuts(
 
     `cut`: that all cuts share
     `cuts`: may be none: the answer is then drawn from what was believed before
-    `method`: computes the limits of each draw; a draw costs one at every speed that was tested
+    `method`: computes how each draw's cuts die away; a draw costs one multiplier for every cut that differs
     `seed`: the same one, the same answer, on any number of processes
     `map`: maps a function over some draws at a time, as the built-in does
     """
     model = model or LabelModel()
     # the mean of the coefficients is that which was believed; spreads that a cut names for itself belong to it
     process = _process(believed, tooling, cut)
-    deepest = _DEEPER * float(np.max(cuts.axial_depth, initial=1e-3))
-    limits = TipLimits(believed.prior, process, method, deepest)
-    posterior = learn_labels(_Mapped(limits, map), believed.prior.size, cuts, model, np.random.default_rng(seed), effort)
-    return LearntTip(believed.prior, process.coefficients, method, model, cuts, posterior)
+    margins, groups = CutMargins(believed.prior, process, method, cuts), groups_of(cuts)
+    groups = groups if len(groups) > 1 else []
+    size, rng = believed.prior.size, np.random.default_rng(seed)
+    posterior = learn_labels(_Mapped(margins, map), size, cuts, margins.points, model, rng, effort, groups=groups)
+    told = (believed.prior, process.coefficients, method, model, cuts, posterior)
+    if not cuts.verdict:
+        return LearntTip(*told)
+    return LearntTip(*told, *beside_physics(cuts, process, posterior, groups, rng))
+
+
+def beside_physics(
+    cuts: TestedCuts, process: MillingProcess, posterior: LabelPosterior, groups: Sequence[FloatArray], rng: np.random.Generator
+) -> tuple[LabelProcess, float, tuple[float, ...]]:
+    """Return the labels without physics, the weight of physics beside them, and the log score of both, as `LearntTip` takes them.
+
+    `groups`: places of cuts that were left out together, whose labels tell the weight; without any it is 1
+    """
+    without = LabelProcess.learnt(cuts, process, rng)
+    if not groups:
+        return without, 1.0, ()
+    held_out, features = np.empty(len(cuts.verdict)), without.features
+    for places in groups:
+        held_out[places] = without.without(places).told(features.at(places))[0]
+    physics, share = posterior.held_out, stable_share(cuts)
+    return without, trust_in(physics, held_out, share), (log_score(physics, share), log_score(held_out, share))
 
 
 def _process(believed: Believed, tooling: Tooling, cut: CutSpec) -> MillingProcess:
@@ -128,15 +150,14 @@ def _process(believed: Believed, tooling: Tooling, cut: CutSpec) -> MillingProce
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Mapped:
-    """Limits of many draws, some at a time wherever the map computes them."""
+    """Margins of many draws, some at a time wherever the map computes them."""
 
-    limits: TipLimits
+    margins: CutMargins
     map: Map
 
-    def __call__(self, z: FloatArray, speeds: FloatArray) -> DrawnLimits:
-        tasks = np.array_split(z, max(1, len(z) // _TASK))
-        parts = list(self.map(partial(self.limits, speeds=speeds), tasks))
-        return DrawnLimits(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("log_limit", "chatter")))
+    def __call__(self, z: FloatArray) -> DrawnMargins:
+        parts = list(self.map(self.margins, np.array_split(z, max(1, len(z) // _TASK))))
+        return DrawnMargins(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("margin", "chatter")))
 
 
 @dataclass(frozen=True, slots=True)

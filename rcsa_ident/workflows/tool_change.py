@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
@@ -24,6 +25,7 @@ from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import BareCutter, Tooling
 from rcsa_ident.stability.discretisation import FullDiscretisation
+from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.lobes import (
@@ -267,29 +269,43 @@ def modes_of(tip: Receptance | TipModes, process: MillingProcess) -> TipModes:
 
 
 def classify_tested_cuts(change: ToolChange, cuts: TestedCuts) -> Tally:
-    """Return how many tested cuts lie on the side of the limit where they were seen, each asked at its own speed."""
-    deepest = 1.01 * float(cuts.axial_depth.max())
-    # a learnt tip's limit is that up to which half of its draws are stable: all of them are asked
-    draws = len(change.machine.posterior.z) if isinstance(change.machine, LearntTip) else 0
-    lobes = change.limits(cuts.spindle_speed, max(change.max_depth, deepest), draws)
-    return tally(cuts, lobes.limit_depth[np.searchsorted(lobes.spindle_speed, cuts.spindle_speed)])
+    """Return how many tested cuts lie on the side of the limit where they were seen, each asked at its own speed and as it was made."""
+    if isinstance(change.machine, LearntTip):
+        # it tells cuts, not limits: a cut may be stable above an unstable depth
+        return tally(cuts, np.where(change.machine.answers(change.process, cuts).stable >= 0.5, np.inf, 0.0))
+    limit = np.empty(cuts.axial_depth.shape)
+    for places, one in _as_made(change, cuts):
+        some = cuts.at_places(places)
+        lobes = one.limits(some.spindle_speed, max(change.max_depth, 1.01 * float(cuts.axial_depth.max())), 0)
+        limit[places] = lobes.limit_depth[np.searchsorted(lobes.spindle_speed, some.spindle_speed)]
+    return tally(cuts, limit)
 
 
-def probabilities_stable(change: ToolChange, cuts: TestedCuts) -> FloatArray:
-    """Return the probability that each tested cut is called stable, shape (n,).
+def tested_answers(change: ToolChange, cuts: TestedCuts) -> TestedAnswers:
+    """Return the probability that each tested cut is called stable, and whether labels cover it.
 
     A machine that was identified, or modes without spreads, say it by their own limits and what those leave open, beside the doubt that
-    labels always have; a learnt tip by its draws.
+    labels always have: no label covers any cut. A learnt tip says it by its draws, and by its labels without physics.
     """
     if isinstance(change.machine, LearntTip):
-        return change.machine.probabilities(change.process, cuts)
-    deepest = max(change.max_depth, 4.0 * float(cuts.axial_depth.max()))
-    speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
-    lobes = change.limits(speeds, deepest)
-    drawn = lobes.limit_depth[None] if lobes.drawn is None else lobes.drawn
-    margin = np.log(np.minimum(drawn, deepest))[:, place] - np.log(cuts.axial_depth)
-    found: FloatArray = LabelNoise().stable(margin).mean(axis=0)
-    return found
+        return change.machine.answers(change.process, cuts)
+    found, deepest = np.empty(cuts.axial_depth.shape), max(change.max_depth, 4.0 * float(cuts.axial_depth.max()))
+    for places, one in _as_made(change, cuts):
+        some = cuts.at_places(places)
+        speeds, place = np.unique(some.spindle_speed, return_inverse=True)
+        lobes = one.limits(speeds, deepest)
+        drawn = lobes.limit_depth[None] if lobes.drawn is None else lobes.drawn
+        margin = np.log(np.minimum(drawn, deepest))[:, place] - np.log(some.axial_depth)
+        found[places] = LabelNoise().stable(margin).mean(axis=0)
+    return TestedAnswers(found, (Covered.NO,) * found.size)
+
+
+def _as_made(change: ToolChange, cuts: TestedCuts) -> list[tuple[NDArray[np.intp], ToolChange]]:
+    """Places of cuts that were made alike, and the question with the cut that they were."""
+    return [
+        (places, replace(change, cut=replace(change.cut, engagement=made.engagement, feed_per_tooth=made.feed_per_tooth)))
+        for places, made in cuts.alike(change.process)
+    ]
 
 
 def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> StabilityMap:

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import labelled_cuts
 from benchmarks.label_scores import Score
-from benchmarks.labelled_cuts import CUTS, TRAINING, Pool, limits_of, read, scores_after, unseen
+from benchmarks.labelled_cuts import CUTS, TRAINING, Pool, margins_of, read, scores_after, unseen
 from rcsa_ident.stability.labels.label_posterior import LabelModel
 from rcsa_ident.stability.labels.tested_cuts import Verdict
 from tests.fixtures.paths import ROOT
@@ -30,10 +30,10 @@ def test_what_is_known_of_the_cuts():
 def test_forty_labels_teach():
     """Of few draws of the prior: cuts of speeds that were never learnt are told better than before."""
     cuts, training, model = read(CUTS), read(TRAINING), LabelModel()
-    speeds, z = np.unique(cuts.spindle_speed), np.random.default_rng(3).standard_normal((250, 8))
-    pool = Pool(z, speeds, limits_of()(z, speeds).log_limit)
+    z = np.random.default_rng(3).standard_normal((600, 8))
+    pool = Pool(z, cuts, margins_of(cuts)(z).margin)
     places = np.flatnonzero(np.isin(cuts.spindle_speed, training.spindle_speed))
-    before, after = (scores_after(pool, cuts, learnt, model)[1] for learnt in (np.zeros(0, dtype=int), places))
+    before, after = (scores_after(pool, learnt, model)[1] for learnt in (np.zeros(0, dtype=int), places))
     assert after.cuts < before.cuts == 118
     assert after.log_score > before.log_score + 0.05
 

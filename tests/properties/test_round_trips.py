@@ -29,6 +29,7 @@ from rcsa_ident.io.settings.tested_cuts import read_tested_cuts, write_tests
 from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.io.toml_text import keys_of_toml, toml_of
 from rcsa_ident.io.validated_table import Table
+from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.toolpath.path import RAPID, ToolPath
 from tests.fixtures.robots import robot
@@ -61,7 +62,8 @@ def test_forces(folder, values):
 @given(rows(3, st.floats(0.01, 100.0)), st.lists(st.sampled_from(list(Verdict)), min_size=8, max_size=8))
 def test_tested_cuts(folder, values, verdicts):
     cuts = TestedCuts(100.0 * values[:, 0], 1e-3 * values[:, 1], tuple(verdicts[: len(values)]), np.full(len(values), np.nan))
-    write_tests(folder / "T.csv", cuts, np.clip(0.01 * values[:, 2], 0.0, 1.0))
+    stable = np.clip(0.01 * values[:, 2], 0.0, 1.0)
+    write_tests(folder / "T.csv", cuts, TestedAnswers(stable, (Covered.PARTLY,) * stable.size))
     found = read_tested_cuts(folder / "T.csv")
     np.testing.assert_allclose(found.spindle_speed, cuts.spindle_speed, rtol=1e-9)
     np.testing.assert_allclose(found.axial_depth, cuts.axial_depth, rtol=1e-9)

@@ -13,11 +13,13 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.results.parts import layout, plain, read_json
+from rcsa_ident.io.settings.tested_cuts import OWN, own_conditions, told
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.label_posterior import LabelModel, LabelPosterior
+from rcsa_ident.stability.labels.label_process import CutFeatures, LabelProcess
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
@@ -27,9 +29,11 @@ from rcsa_ident.version import __version__
 
 #: What the key ``kind`` of such a file says; RESULT.json has no such key.
 KIND = "learnt tip"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 #: Digits of draws: they are no better known.
 _DIGITS = 7
+#: Speeds of points in rev/min.
+_PER_POINT = np.array([to_rpm(1.0), 1.0, 1.0])
 Nouns = TypeVar("Nouns", LabelNoise, LimitDiscrepancy)
 
 
@@ -78,18 +82,58 @@ def learnt_tip_to_json(learnt: LearntTip) -> dict[str, Any]:
         "cuts": [
             {"spindle_speed_rpm": to_rpm(float(speed), 6), "axial_depth_mm": round(1e3 * float(depth), 9), "verdict": str(verdict)}
             | ({} if np.isnan(chatter) else {"chatter_frequency_hz": to_hz(float(chatter))})
-            for speed, depth, verdict, chatter in zip(
-                cuts.spindle_speed, cuts.axial_depth, cuts.verdict, cuts.chatter_frequency, strict=True
+            | {name: cell for name in OWN if (cell := told(own, name))}
+            for speed, depth, verdict, chatter, own in zip(
+                cuts.spindle_speed, cuts.axial_depth, cuts.verdict, cuts.chatter_frequency, cuts.own, strict=True
             )
         ],
         "posterior": {
             "effective_draws": found.effective,
             "log_evidence": found.log_evidence,
-            "speeds_rpm": to_rpm(found.speeds, 6).tolist(),
+            "points": (found.points * _PER_POINT).tolist(),
             "draws": _rounded(found.z),
             "errors": _rounded(found.error),
         },
+    } | _process_to_json(learnt)
+
+
+def _process_to_json(learnt: LearntTip) -> dict[str, Any]:
+    """The labels without physics, beside it."""
+    own = learnt.process
+    if own is None:
+        return {}
+    features = own.features
+    return {
+        "without_physics": {
+            "weight_of_physics": learnt.trust,
+            "log_scores": list(learnt.scores),
+            "log_evidence": own.log_evidence,
+            "middle": own.middle.tolist(),
+            "sessions": list(own.sessions),
+            "numbers": features.numbers.tolist(),
+            "kinds": features.kinds.tolist(),
+            "session": features.session.tolist(),
+            "counts": own.counts.tolist(),
+            "draws": _rounded(own.drawn),
+        }
     }
+
+
+def _process_of(top: Table) -> dict[str, Any]:
+    """The same as `LearntTip` takes it."""
+    if "without_physics" not in top.data:
+        return {}
+    table = top.table("without_physics")
+    numbers, kinds, counts, drawn = (_matrix(table, key, n) for key, n in (("numbers", 4), ("kinds", 2), ("counts", 3), ("draws", None)))
+    session = np.array(table.numbers("session", None))
+    for key, size in (("kinds", len(kinds)), ("counts", len(counts)), ("session", session.size)):
+        if size != len(numbers):
+            table.refuse(key, f"{size} rows", f"as many as numbers: {len(numbers)}")
+    names = tuple(str(each) for each in table.value("sessions", "a list of names"))
+    features = CutFeatures(numbers, kinds, session)
+    process = LabelProcess(features, np.array(table.numbers("middle", 4)), names, counts, drawn, table.number("log_evidence"))
+    scores = tuple(table.numbers("log_scores", None)) if table.data.get("log_scores") else ()
+    return {"process": process, "trust": table.number("weight_of_physics", least=0.0, most=1.0), "scores": scores}
 
 
 def believed(learnt: LearntTip) -> dict[str, Any]:
@@ -140,13 +184,12 @@ def learnt_tip_of(data: Any, where: str) -> LearntTip:
     model = LabelModel(_noun(labels, "noise", LabelNoise), _noun(labels, "discrepancy", LimitDiscrepancy))
     found = top.table("posterior")
     z = _matrix(found, "draws", prior.size)
-    speeds = from_rpm(np.array(found.numbers("speeds_rpm", None, "rev/min", above=0.0)))
+    points = (_matrix(found, "points", 3) if top.data.get("cuts") else np.zeros((0, 3))) / _PER_POINT
+    errors = _matrix(found, "errors", len(points)) if len(points) else np.zeros((len(z), 0))
     with found.naming({}):
-        posterior = LabelPosterior(
-            z, speeds, _matrix(found, "errors", speeds.size), found.number("log_evidence"), found.number("effective_draws", above=0.0)
-        )
+        posterior = LabelPosterior(z, points, errors, found.number("log_evidence"), found.number("effective_draws", above=0.0))
     method = METHODS[top.text("method", choices=tuple(METHODS))]()
-    return LearntTip(prior, workpiece.coefficients, method, model, _cuts(top), posterior)
+    return LearntTip(prior, workpiece.coefficients, method, model, _cuts(top), posterior, **_process_of(top))
 
 
 def _cuts(top: Table) -> TestedCuts:
@@ -156,6 +199,7 @@ def _cuts(top: Table) -> TestedCuts:
         1e-3 * np.array([row.number("axial_depth_mm", "mm", above=0.0) for row in rows]),
         tuple(Verdict(row.text("verdict", choices=tuple(Verdict))) for row in rows),
         from_hz(np.array([row.number("chatter_frequency_hz", "Hz", np.nan, above=0.0) for row in rows])),
+        tuple(own_conditions({name: str(row.data[name]) for name in OWN if name in row.data}) for row in rows),
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,15 +13,28 @@ from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.io.validated_table import listed
+from rcsa_ident.stability.labels.coverage import TestedAnswers
+from rcsa_ident.stability.labels.tested_cuts import EDGE_STATES, ORDINAL, STRATEGIES, OwnConditions, TestedCuts, Verdict
 
 COLUMNS = ("spindle_speed_rpm", "axial_depth_mm", "verdict")
 #: May stand beside them; empty where nothing was measured.
 CHATTER = "chatter_frequency_hz"
+#: May stand beside them, too, with what each cut tells of itself; empty where it is as of the cut that is asked about.
+_NUMBERS = {
+    "radial_width_mm": ("radial_width", 1e-3),
+    "radial_immersion": ("radial_immersion", 1.0),
+    "feed_per_tooth_mm": ("feed_per_tooth", 1e-3),
+}
+_WORDS = {"strategy": STRATEGIES, "edge_state": EDGE_STATES, "session": ()}
+FURTHER = ("verdict_2", "verdict_3")
+OWN = (*_NUMBERS, *_WORDS, *FURTHER)
+#: Verdicts as numbers, as tables of others have them.
+_CODES = dict(zip("012", ORDINAL, strict=True))
 
 
 def read_tested_cuts(path: str | Path) -> TestedCuts:
-    """Return the cuts of a table with the columns `COLUMNS`, with or without `CHATTER`.
+    """Return the cuts of a table with the columns `COLUMNS`, with or without `CHATTER` and `OWN`.
 
     Raises `InputError`, which names the file and the line.
     """
@@ -30,7 +45,7 @@ def read_candidates(path: str | Path) -> TestedCuts:
     """Return cuts that may be tested: the first two of `COLUMNS`; verdicts, where there are any, are not looked at."""
     table = read_table(path, "cuts to choose from")
     speed, depth = _conditions(table, COLUMNS[:2])
-    return TestedCuts(from_rpm(speed), depth * 1e-3, (Verdict.MARGINAL,) * speed.size)
+    return TestedCuts(from_rpm(speed), depth * 1e-3, (Verdict.MARGINAL,) * speed.size, None, _own(table))
 
 
 def tested_cuts_of(text: str, where: str) -> TestedCuts:
@@ -54,10 +69,70 @@ def _cuts_of(table: TextTable) -> TestedCuts:
     speed, depth = _conditions(table, COLUMNS)
     verdicts = []
     for row, text in enumerate(table.texts(COLUMNS[2])):
-        if text.lower() not in list(Verdict):
-            raise InputError(f"column {COLUMNS[2]}", text or "nothing", f"one of {', '.join(Verdict)}", table.at(row))
-        verdicts.append(Verdict(text.lower()))
-    return TestedCuts(from_rpm(speed), depth * 1e-3, tuple(verdicts), from_hz(_chatter(table)))
+        try:
+            verdicts.append(_verdict(text, COLUMNS[2]))
+        except InputError as error:
+            raise InputError(f"column {error.field}", error.found, error.allowed, table.at(row)) from None
+    return TestedCuts(from_rpm(speed), depth * 1e-3, tuple(verdicts), from_hz(_chatter(table)), _own(table))
+
+
+def _verdict(text: str, column: str) -> Verdict:
+    """A verdict as a word, or as 0, 1 or 2."""
+    word = _CODES.get(text, text.lower())
+    if word not in list(Verdict):
+        raise InputError(column, text or "nothing", f"one of {', '.join(Verdict)}, or 0, 1, 2")
+    return Verdict(word)
+
+
+def _own(table: TextTable) -> tuple[OwnConditions, ...]:
+    """What each cut tells of itself."""
+    _one_tooling(table)
+    columns = {name: table.texts(name) for name in OWN if name in table.header}
+    found = []
+    for row in range(len(table.lines)):
+        try:
+            found.append(own_conditions({name: texts[row] for name, texts in columns.items()}))
+        except InputError as error:
+            raise InputError(f"column {error.field}", error.found, error.allowed, table.at(row)) from None
+    return tuple(found)
+
+
+def own_conditions(cells: Mapping[str, str]) -> OwnConditions:
+    """Return what the cells of one row, by their columns of `OWN`, tell of a cut; an empty cell tells nothing.
+
+    Raises `InputError`, which names the column.
+    """
+    row: dict[str, Any] = {}
+    for column, (name, unit) in _NUMBERS.items():
+        if cells.get(column):
+            row[name] = _positive(cells[column], column) * unit
+    for column, allowed in _WORDS.items():
+        word = cells.get(column, "")
+        row[column] = word.lower() if allowed else word
+        if allowed and row[column] not in ("", *allowed):
+            raise InputError(column, word, f"one of {', '.join(allowed)}, or nothing")
+    votes = [_verdict(cells[column], column) for column in FURTHER if cells.get(column)]
+    return OwnConditions(**row, further=tuple(votes))
+
+
+def _positive(text: str, column: str) -> float:
+    allowed = f"a finite number above 0{' [mm]' if column.endswith('_mm') else ''}, or nothing"
+    try:
+        value = float("x" if "_" in text else text)
+    except ValueError:
+        raise InputError(column, text, allowed) from None
+    if not 0.0 < value < np.inf:
+        raise InputError(column, text, allowed)
+    return value
+
+
+def _one_tooling(table: TextTable) -> None:
+    """Refuse a table of several toolings: a learnt tip answers for one."""
+    names = dict.fromkeys(table.texts("tooling")) if "tooling" in table.header else {}
+    if len(names) > 1:
+        raise InputError(
+            "column tooling", f"{len(names)} toolings: {listed(tuple(names))}", "one tooling: each learns by itself", table.where
+        )
 
 
 def _chatter(table: TextTable) -> FloatArray:
@@ -71,8 +146,24 @@ def _chatter(table: TextTable) -> FloatArray:
     return found
 
 
-def write_tests(path: str | Path, cuts: TestedCuts, probability: FloatArray) -> None:
-    """Write TESTS.csv: each tested cut with the probability that it is stable. `probability`, shape (n,)."""
-    rows = zip(to_rpm(cuts.spindle_speed), 1e3 * cuts.axial_depth, cuts.verdict, probability, strict=True)
-    lines = [f"{speed:.10g},{depth:.10g},{verdict},{p:.6g}" for speed, depth, verdict, p in rows]
-    write_text(path, "\n".join([",".join((*COLUMNS, "probability_stable")), *lines, ""]))
+def write_tests(path: str | Path, cuts: TestedCuts, answers: TestedAnswers) -> None:
+    """Write TESTS.csv: each tested cut with the probability that it is stable, and whether labels cover it."""
+    shown = [column for column in OWN if any(told(own, column) for own in cuts.own)]
+    rows = zip(to_rpm(cuts.spindle_speed), 1e3 * cuts.axial_depth, cuts.verdict, cuts.own, answers.stable, answers.covered, strict=True)
+    lines = [
+        ",".join([f"{speed:.10g}", f"{depth:.10g}", verdict, *(told(own, column) for column in shown), f"{p:.6g}", cover])
+        for speed, depth, verdict, own, p, cover in rows
+    ]
+    write_text(path, "\n".join([",".join((*COLUMNS, *shown, "probability_stable", "covered")), *lines, ""]))
+
+
+def told(own: OwnConditions, column: str) -> str:
+    """Return the cell of a column of `OWN`, as `own_conditions` reads it."""
+    if column in FURTHER:
+        at = FURTHER.index(column)
+        return str(own.further[at]) if at < len(own.further) else ""
+    if column in _WORDS:
+        return str(getattr(own, column))
+    name, unit = _NUMBERS[column]
+    value = getattr(own, name)
+    return "" if value is None else f"{value / unit:.10g}"

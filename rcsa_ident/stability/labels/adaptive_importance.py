@@ -55,7 +55,7 @@ def adaptive_importance(
     parts = [first]
     logs = [log_likelihood(first)]
     for _ in range(rounds):
-        new, density = _mixture(np.concatenate(parts), _shares(logs), further, rng)
+        new, density = _mixture(np.concatenate(parts), _gentle(_shares(logs), 2.0 * first.shape[1]), further, rng)
         parts.append(new)
         logs.append(log_likelihood(new) + _log_normal(new) - density(new))
     evidence = [float(logsumexp(own)) - np.log(own.size) for own in logs]
@@ -71,6 +71,17 @@ def _effective(logs: list[FloatArray]) -> FloatArray:
 def _shares(logs: list[FloatArray]) -> FloatArray:
     """Weights of sum 1, each round's sum in proportion to its effective draws."""
     return np.concatenate([share * np.exp(own - logsumexp(own)) for share, own in zip(_effective(logs), logs, strict=True)])
+
+
+def _gentle(weight: FloatArray, fewest: float) -> FloatArray:
+    """Weights raised to a power, at most one, at which they count for so many draws: where few agree, the next round looks around them."""
+    power = 1.0
+    while power > 1e-3:
+        found = weight**power / np.sum(weight**power)
+        if np.sum(found**2) * fewest <= 1.0:
+            break
+        power *= 0.8
+    return found
 
 
 def _mixture(

@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +46,17 @@ class LabelNoise:
         found: FloatArray = self.wrong + (1.0 - 2.0 * self.wrong) * ndtr(margin / self.width)
         return found
 
-    def log_likelihood(self, cuts: TestedCuts, log_limit: FloatArray) -> FloatArray:
-        """Return the log probability of all labels together, shape (...).
+    def log_likelihood(self, cuts: TestedCuts, margin: FloatArray) -> FloatArray:
+        """Return the log probability of all labels together, shape (...); verdicts of several on one cut share its weight.
 
         `cuts`: TestedCuts, n of them
-        `log_limit`, shape (..., n): logarithm of the limit [m] at each cut
+        `margin` [-], shape (..., n): log(limit / depth) of each cut, or what stands for it where islands are
         """
-        margin = log_limit - np.log(cuts.axial_depth)
-        probability = {Verdict.STABLE: self.stable, Verdict.CHATTER: lambda m: self.stable(-m), Verdict.MARGINAL: self._marginal}
-        found = np.zeros(log_limit.shape[:-1])
-        for verdict, p in probability.items():
-            if verdict in cuts.verdict:
-                found += np.sum(np.log(p(margin[..., cuts.seen(verdict)])), axis=-1)
+        found = np.zeros(margin.shape[:-1])
+        for share, p in zip(cuts.shares.T, (self.stable, self._marginal, lambda m: self.stable(-m)), strict=True):
+            where = share > 0.0
+            if where.any():
+                found += np.log(p(margin[..., where])) @ share[where]
         return found
 
     def heard(self, cuts: TestedCuts, chatter: FloatArray) -> FloatArray:

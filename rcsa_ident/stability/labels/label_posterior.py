@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,18 +11,18 @@ from scipy.special import logsumexp
 from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.labels.adaptive_importance import adaptive_importance, systematic
+from rcsa_ident.stability.labels.cut_margins import DrawnMargins
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts
-from rcsa_ident.stability.labels.uncertain_tip import DrawnLimits
 
 #: Draws of the limit's smooth error over which a likelihood is averaged, and moves that each kept draw's error makes in the end.
 _ERRORS, _MOVES = 256, 30
 #: Effective draws below which an answer is called suspect.
 FEWEST = 30.0
 
-#: Of z, shape (d, size), and speeds, shape (n,) [rad/s].
-Limits = Callable[[FloatArray, FloatArray], DrawnLimits]
+#: Of z, shape (d, size).
+Margins = Callable[[FloatArray], DrawnMargins]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,83 +51,93 @@ class LabelPosterior:
     """Draws that stand for what is believed after the labels, each as probable as the other.
 
     `z`, shape (r, size): numbers of the uncertain tip
-    `speeds` [rad/s], shape (n,): tested ones, rising; none before the first label
-    `error`, shape (r, n): of the logarithm of the limit, at these speeds
+    `points`, shape (n, 3): tested speeds [rad/s], immersions and directions, as `LimitDiscrepancy` takes them; none before the first label
+    `error`, shape (r, n): of the logarithm of the limit, at these points
     `log_evidence`: logarithm of the probability of all labels before they were seen
     `effective`: draws with equal weights that would tell as much as the weighted ones that these were chosen from
+    `held_out`, shape (m,): probability that each cut is called stable, by draws that know nothing of the cuts left out with it
     """
 
     z: FloatArray
-    speeds: FloatArray
+    points: FloatArray
     error: FloatArray
     log_evidence: float
     effective: float
+    held_out: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        for name in ("z", "speeds", "error"):
+        for name in ("z", "points", "error"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        if self.error.shape != (len(self.z), self.speeds.size) or len(self.z) == 0:
-            raise InputError("error", self.error.shape, f"one or more draws, and shape {(len(self.z), self.speeds.size)}")
+        if self.error.shape != (len(self.z), len(self.points)) or len(self.z) == 0:
+            raise InputError("error", self.error.shape, f"one or more draws, and shape {(len(self.z), len(self.points))}")
 
     def errors(self, discrepancy: LimitDiscrepancy, at: FloatArray, seed: int = 1) -> FloatArray:
-        """Return each draw's error of the log limit at speeds, shape (r, m)."""
-        return discrepancy.given(self.speeds, self.error, at, np.random.default_rng(seed))
+        """Return each draw's error of the log limit at points, shape (m, 3) -> (r, m)."""
+        return discrepancy.given(self.points, self.error, at, np.random.default_rng(seed))
 
 
 def learn_labels(
-    limits: Limits,
+    margins: Margins,
     size: int,
     cuts: TestedCuts,
+    points: FloatArray,
     model: LabelModel,
     rng: np.random.Generator,
     effort: Effort | None = None,
     first: FloatArray | None = None,
+    groups: Sequence[FloatArray] = (),
 ) -> LabelPosterior:
     """Return what is believed after labels.
 
     Parameters
     ----------
-    limits : callable
+    margins : callable
         Of numbers that are standard normal before the labels.
     size : int
         How many numbers.
     cuts : TestedCuts
         May be none.
+    points : array, shape (n, 3)
+        Speed, immersion and direction of each cut, as `LimitDiscrepancy` takes them.
     model : LabelModel
     rng : numpy.random.Generator
     effort : Effort, optional
     first : array, shape (n, size), optional
-        The first round, drawn from the prior, where its limits are known already.
+        The first round, drawn from the prior, where its margins are known already.
+    groups : sequence of arrays of places, optional
+        Cuts that are left out together.
 
     Notes
     -----
-    The error d of the log limit costs nothing to draw, the limits of a tip do: importance sampling learns where to draw tips, and each
+    The error d of the log limit costs nothing to draw, the margins of a tip do: importance sampling learns where to draw tips, and each
     tip's likelihood is the mean over many errors, so that tip and error are weighted together. Tips are then drawn by their weights, an
-    error for each by its share, and the errors move on by elliptical slices [murray2010], for which no limit has to be computed again.
+    error for each by its share, and the errors move on by elliptical slices [murray2010], for which no margin has to be computed again.
     """
     effort = effort or Effort()
-    speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
-    if not speeds.size:
-        return LabelPosterior(rng.standard_normal((effort.kept, size)), speeds, np.zeros((effort.kept, 0)), 0.0, float(effort.kept))
+    where, place = np.unique(points, axis=0, return_inverse=True)
+    if not len(where):
+        return LabelPosterior(rng.standard_normal((effort.kept, size)), where, np.zeros((effort.kept, 0)), 0.0, float(effort.kept))
     start = rng.standard_normal((effort.first, size)) if first is None else first
-    root = model.discrepancy.root(speeds)
-    number = _even_normals(speeds.size, rng)
+    root = model.discrepancy.root(where)
+    number = _even_normals(len(where), rng)
     joint = _Joint(model.noise, cuts, place)
-    known: list[DrawnLimits] = []
+    known: list[DrawnMargins] = []
 
     def log_likelihood(z: FloatArray) -> FloatArray:
-        known.append(limits(z, speeds))
+        known.append(margins(z))
         return _mean(joint.of_all(known[-1], number @ root.T))
 
     found = adaptive_importance(log_likelihood, start, rng, effort.further, effort.rounds)
     chosen = systematic(found.weight, effort.kept, rng)
-    drawn = DrawnLimits(*(np.concatenate([getattr(part, name) for part in known])[chosen] for name in ("log_limit", "chatter")))
+    tips = DrawnMargins(*(np.concatenate([getattr(part, name) for part in known]) for name in ("margin", "chatter")))
+    drawn = DrawnMargins(tips.margin[chosen], tips.chatter[chosen])
     own = joint.of_all(drawn, number @ root.T)
     share = np.exp(own - logsumexp(own, axis=1, keepdims=True))
     first = np.array([rng.choice(_ERRORS, p=each / each.sum()) for each in share])
     moved = elliptical_slices(number[first], lambda u: joint.of_each(drawn, u @ root.T), rng, _MOVES)
     order = rng.permutation(effort.kept)
-    return LabelPosterior(found.z[chosen][order], speeds, (moved @ root.T)[order], found.log_evidence, found.effective)
+    held_out = joint.held_out(tips, found.weight, (number @ root.T)[: _ERRORS // 4], groups)
+    return LabelPosterior(found.z[chosen][order], where, (moved @ root.T)[order], found.log_evidence, found.effective, held_out)
 
 
 def _even_normals(size: int, rng: np.random.Generator) -> FloatArray:
@@ -154,20 +164,35 @@ class _Joint:
     cuts: TestedCuts
     place: FloatArray
 
-    def of_all(self, tips: DrawnLimits, error: FloatArray) -> FloatArray:
-        """Of each tip with each error, shapes (d, n), (e, n) -> (d, e)."""
-        found = np.zeros((len(tips.log_limit), len(error)))
-        for k, at in enumerate(self.place):
-            margin = tips.log_limit[:, at, None] + error[:, at]
+    def of_all(self, tips: DrawnMargins, error: FloatArray) -> FloatArray:
+        """Of each tip with each error, shapes (d, n), (e, p) -> (d, e)."""
+        return self.of_all_at(tips, error, np.arange(len(self.place)))
+
+    def of_all_at(self, tips: DrawnMargins, error: FloatArray, places: FloatArray) -> FloatArray:
+        """The same of some of the labels."""
+        found = np.zeros((len(tips.margin), len(error)))
+        for k in places:
+            margin = tips.margin[:, k, None] + error[:, self.place[k]]
             found += self.noise.log_likelihood(self.cuts.at_places(np.array([k])), margin[..., None])
-        return found + self._heard(tips)[:, None]
+        return found + self.noise.heard(self.cuts.at_places(places), tips.chatter[:, places])[:, None]
 
-    def of_each(self, tips: DrawnLimits, error: FloatArray) -> FloatArray:
-        """Of each tip with its own error, shapes (d, n), (d, n) -> (d,)."""
-        return self.noise.log_likelihood(self.cuts, (tips.log_limit + error)[:, self.place]) + self._heard(tips)
+    def of_each(self, tips: DrawnMargins, error: FloatArray) -> FloatArray:
+        """Of each tip with its own error, shapes (d, n), (d, p) -> (d,)."""
+        return self.noise.log_likelihood(self.cuts, tips.margin + error[:, self.place]) + self.noise.heard(self.cuts, tips.chatter)
 
-    def _heard(self, tips: DrawnLimits) -> FloatArray:
-        return self.noise.heard(self.cuts, tips.chatter[:, self.place])
+    def held_out(self, tips: DrawnMargins, weight: FloatArray, error: FloatArray, groups: Sequence[FloatArray]) -> FloatArray:
+        """Probability that each cut is called stable, by tips and errors weighted as if its group had not been seen, shape (n,)."""
+        found = np.zeros(len(self.place) if groups else 0)
+        own = [self.of_all_at(tips, error, places) for places in groups]
+        total = np.sum(own, axis=0)
+        # what weighs a tip beside the labels: prior over the density that it was drawn from
+        before = np.log(np.maximum(weight, 1e-300)) - (_mean(total) if groups else 0.0)
+        for places, mine in zip(groups, own, strict=True):
+            left = before[:, None] + total - mine
+            share = np.exp(left - logsumexp(left))
+            for k in places:
+                found[k] = np.sum(share * self.noise.stable(tips.margin[:, k, None] + error[:, self.place[k]]))
+        return found
 
 
 def elliptical_slices(

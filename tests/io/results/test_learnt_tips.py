@@ -19,7 +19,7 @@ def test_a_mode_that_moves_along_z_is_read_back(tmp_path):
     """The residual compliance beside it has three rows, which were refused."""
     mode = normal_modes([4400.0], [0.03], 0.35 * np.array([[0.6, 0.64, 0.48]]), DIRECTIONS[:3])
     prior = UncertainTip.independent(TipModes.joined([mode.pole_residue()]), np.full((3, 1), 0.1), (0.1, 0.2))
-    posterior = LabelPosterior(np.zeros((2, prior.size)), np.array([900.0]), np.zeros((2, 1)), 0.0, 2.0)
+    posterior = LabelPosterior(np.zeros((2, prior.size)), np.array([[900.0, 0.5, 0.0]]), np.zeros((2, 1)), 0.0, 2.0)
     cuts = TestedCuts(np.array([900.0]), np.array([1e-3]), (Verdict.STABLE,))
     learnt = LearntTip(prior, CuttingCoefficients(9e8, 0.3), ZeroOrder(), LabelModel(), cuts, posterior)
     write_learnt_tip(tmp_path / "L.json", learnt)

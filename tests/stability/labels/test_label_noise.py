@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.stability.labels.label_noise import LabelNoise
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
 
 NOISE = LabelNoise(width=0.1, wrong=0.02)
 
@@ -19,7 +19,7 @@ def cuts(verdict, depth=1e-3, chatter=np.nan):
 
 def of(verdict, margin, noise=NOISE):
     """Log likelihood of one label whose limit lies that far (of the logarithm) above the cut."""
-    return float(noise.log_likelihood(cuts(verdict), np.array([np.log(1e-3) + margin])))
+    return float(noise.log_likelihood(cuts(verdict), np.array([margin])))
 
 
 def test_a_cut_far_inside_is_no_news():
@@ -48,10 +48,16 @@ def test_a_marginal_cut_holds_the_limit_beside_it():
 
 def test_all_labels_multiply():
     many = TestedCuts(np.full(3, 800.0), np.array([1e-3, 2e-3, 3e-3]), (Verdict.STABLE, Verdict.CHATTER, Verdict.MARGINAL))
-    limit = np.log(np.array([[1.5e-3] * 3, [2.5e-3] * 3]))
-    for row, found in zip(limit, NOISE.log_likelihood(many, limit), strict=True):
-        single = [of(str(v), row[k] - np.log(many.axial_depth[k])) for k, v in enumerate(many.verdict)]
+    margins = np.log(np.array([[1.5e-3] * 3, [2.5e-3] * 3]) / many.axial_depth)
+    for row, found in zip(margins, NOISE.log_likelihood(many, margins), strict=True):
+        single = [of(str(v), row[k]) for k, v in enumerate(many.verdict)]
         assert found == pytest.approx(sum(single))
+
+
+def test_verdicts_of_several_on_one_cut_share_its_weight():
+    own = (OwnConditions(further=(Verdict.CHATTER,)),)
+    two = TestedCuts(np.array([800.0]), np.array([1e-3]), (Verdict.STABLE,), own=own)
+    assert NOISE.log_likelihood(two, np.array([0.1])) == pytest.approx(0.5 * (of("stable", 0.1) + of("chatter", 0.1)))
 
 
 def test_a_measured_chatter_frequency():

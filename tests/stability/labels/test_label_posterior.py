@@ -6,22 +6,27 @@ import numpy as np
 import pytest
 
 from rcsa_ident.base.errors import InputError
+from rcsa_ident.stability.labels.cut_margins import DrawnMargins
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, LabelPosterior, elliptical_slices, learn_labels
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.labels.uncertain_tip import DrawnLimits
+from tests.stability.labels.test_limit_discrepancy import points
 
 MODEL = LabelModel(LabelNoise(width=0.15), LimitDiscrepancy(0.2, 0.1))
 EFFORT = Effort(2000, 1000, 2, 1500)
 S, C = Verdict.STABLE, Verdict.CHATTER
 
 
-def limits(z, speeds):
-    """A limit of 1 mm, its logarithm 0.3 z0 everywhere and 0.3 z1 more above 700 rad/s; chatter at 5000 rad/s times e^(0.1 z1)."""
-    high = (speeds > 700.0).astype(float)
-    log = np.log(1e-3) + 0.3 * z[:, :1] + 0.3 * z[:, 1:2] * high
-    return DrawnLimits(log, np.tile(5000.0 * np.exp(0.1 * z[:, 1:2]), speeds.size))
+def learnt(cuts, seed=1, groups=()):
+    """From a limit of 1 mm, its logarithm 0.3 z0 everywhere and 0.3 z1 more above 700 rad/s; chatter at 5000 rad/s times e^(0.1 z1)."""
+
+    def margins(z):
+        high = (cuts.spindle_speed > 700.0).astype(float)
+        log = np.log(1e-3) + 0.3 * z[:, :1] + 0.3 * z[:, 1:2] * high
+        return DrawnMargins(log - np.log(cuts.axial_depth), np.tile(5000.0 * np.exp(0.1 * z[:, 1:2]), cuts.axial_depth.size))
+
+    return learn_labels(margins, 2, cuts, points(cuts.spindle_speed), MODEL, np.random.default_rng(seed), EFFORT, groups=groups)
 
 
 def brute(cuts, model):
@@ -29,7 +34,7 @@ def brute(cuts, model):
     t = np.linspace(-4.5, 4.5, 41)
     z0, z1, u0, u1 = np.meshgrid(t, t, t, t, indexing="ij", sparse=True)
     speeds = np.unique(cuts.spindle_speed)
-    root = model.discrepancy.root(speeds)
+    root = model.discrepancy.root(points(speeds))
     error = root[0, 0] * u0, root[1, 0] * u0 + root[1, 1] * u1
     log_p = -0.5 * (z0**2 + z1**2 + u0**2 + u1**2)
     for k, verdict in enumerate(cuts.verdict):
@@ -49,20 +54,17 @@ def brute(cuts, model):
 def test_beside_the_sum_over_a_grid(heard):
     speed, depth = np.array([600.0, 600.0, 800.0, 800.0, 800.0]), np.array([0.8, 1.3, 1.5, 2.0, 1.2]) * 1e-3
     cuts = TestedCuts(speed, depth, (S, S, C, C, C), np.array([np.nan, np.nan, heard, np.nan, np.nan]))
-    found = learn_labels(limits, 2, cuts, MODEL, np.random.default_rng(1), EFFORT)
+    found = learnt(cuts)
     means, evidence = brute(cuts, MODEL)
     assert [*found.z.mean(axis=0), *found.error.mean(axis=0)] == pytest.approx(means, abs=0.06)
     assert found.log_evidence == pytest.approx(evidence, abs=0.06)
-    assert found.speeds.tolist() == [600.0, 800.0]
+    assert found.points[:, 0].tolist() == [600.0, 800.0]
 
 
 def test_a_frequency_tells_what_a_verdict_does_not():
     speed, depth = np.array([800.0]), np.array([3e-3])
     """Beside a normal likelihood of width 0.02 / 0.1 with a floor: a share of the draws believes in another line of the spectrum."""
-    spread = [
-        learn_labels(limits, 2, TestedCuts(speed, depth, (C,), np.array([hertz])), MODEL, np.random.default_rng(1), EFFORT).z.std(axis=0)[1]
-        for hertz in (np.nan, 5000.0)
-    ]
+    spread = [learnt(TestedCuts(speed, depth, (C,), np.array([hertz]))).z.std(axis=0)[1] for hertz in (np.nan, 5000.0)]
     assert spread[0] > 0.8
     narrow = 0.2 / np.sqrt(1.04)
     other = 0.02 / (0.02 + 0.98 * narrow)
@@ -71,27 +73,39 @@ def test_a_frequency_tells_what_a_verdict_does_not():
 
 def test_cuts_far_inside_teach_nothing():
     cuts = TestedCuts(np.array([600.0, 800.0]), np.array([0.02e-3, 60e-3]), (S, C))
-    found = learn_labels(limits, 2, cuts, MODEL, np.random.default_rng(2), EFFORT)
+    found = learnt(cuts, 2)
     assert found.z.mean(axis=0) == pytest.approx([0.0, 0.0], abs=0.06)
     assert found.z.std(axis=0) == pytest.approx([1.0, 1.0], abs=0.06)
     assert found.log_evidence == pytest.approx(2.0 * np.log(0.98), abs=0.01)
 
 
 def test_before_the_first_label_it_is_the_prior():
-    found = learn_labels(limits, 2, TestedCuts.none(), MODEL, np.random.default_rng(1), EFFORT)
+    found = learnt(TestedCuts.none())
     assert found.error.shape == (1500, 0)
     assert found.z.std(axis=0) == pytest.approx([1.0, 1.0], abs=0.06)
-    assert found.errors(MODEL.discrepancy, np.array([600.0, 900.0])).std(axis=0) == pytest.approx([0.2, 0.2], rel=0.08)
+    assert found.errors(MODEL.discrepancy, points([600.0, 900.0])).std(axis=0) == pytest.approx([0.2, 0.2], rel=0.08)
 
 
 def test_the_order_of_labels_and_the_seed():
     speed, depth = np.array([600.0, 800.0, 800.0]), np.array([1.0, 1.5, 2.0]) * 1e-3
-    one, two = (
-        learn_labels(limits, 2, TestedCuts(speed, depth, (S, C, C)).at_places(np.array(order)), MODEL, np.random.default_rng(1), EFFORT)
-        for order in ((0, 1, 2), (2, 0, 1))
-    )
+    one, two = (learnt(TestedCuts(speed, depth, (S, C, C)).at_places(np.array(order))) for order in ((0, 1, 2), (2, 0, 1)))
     assert np.allclose(one.z, two.z)
     assert np.allclose(one.error, two.error)
+
+
+def test_cuts_that_are_left_out_are_told_as_if_they_had_not_been_seen():
+    """Beside learning from the others alone."""
+    speed, depth = np.array([600.0, 600.0, 800.0, 800.0]), np.array([0.8, 1.3, 1.5, 1.0]) * 1e-3
+    cuts, groups = TestedCuts(speed, depth, (S, C, C, S)), [np.array([0, 1]), np.array([2, 3])]
+    held_out = learnt(cuts, groups=groups).held_out
+    for k, (left, rest) in enumerate((groups, groups[::-1])):
+        other = learnt(cuts.at_places(rest))
+        error = other.errors(MODEL.discrepancy, points(speed[left[:1]]))
+        z = other.z
+        for place in left:
+            log = np.log(1e-3) + 0.3 * z[:, 0] + 0.3 * z[:, 1] * (speed[place] > 700.0) + error[:, 0]
+            expected = MODEL.noise.stable(log - np.log(depth[place])).mean()
+            assert held_out[place] == pytest.approx(expected, abs=0.05), k
 
 
 def test_elliptical_slices_leave_a_posterior_as_it_is():
@@ -107,4 +121,4 @@ def test_elliptical_slices_leave_a_posterior_as_it_is():
 
 def test_what_no_posterior_has():
     with pytest.raises(InputError, match="draws"):
-        LabelPosterior(np.zeros((3, 2)), np.array([600.0]), np.zeros((3, 2)), 0.0, 3.0)
+        LabelPosterior(np.zeros((3, 2)), points([600.0]), np.zeros((3, 2)), 0.0, 3.0)

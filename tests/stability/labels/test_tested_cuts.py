@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,11 @@ from hypothesis import strategies as st
 
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import from_rpm
-from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, Verdict, tally
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.stability.labels.tested_cuts import OwnConditions, Tally, TestedCuts, Verdict, tally
 
 
 def test_four_cases_and_the_marginal_ones():
@@ -52,7 +58,53 @@ def test_labels_that_contradict_each_other_are_named():
     words = ("stable", "chatter", "stable", "stable", "chatter", "marginal")
     cuts = TestedCuts(speed, np.array([0.5, 1.0, 1.25, 1.0, 1.1, 1.0]) * 1e-3, tuple(map(Verdict, words)))
     (told,) = cuts.contradictions
-    assert told == ("at 7200 rev/min a cut of 1.25 mm was stable and one of 1 mm chattered: the labels contradict each other")
+    beside = "the labels contradict each other, or that depth is an island"
+    assert told == f"at 7200 rev/min a cut of 1.25 mm was stable and one of 1 mm chattered: {beside}"
+    # of another width they do not
+    own = tuple(OwnConditions(radial_width=1e-3 * (1 + k)) for k in range(6))
+    assert replace(cuts, own=own).contradictions == ()
+    many = TestedCuts(np.repeat(np.arange(500.0, 506.0), 2), np.tile([1e-3, 2e-3], 6), (Verdict.CHATTER, Verdict.STABLE) * 6)
+    assert len(many.contradictions) == 4
+    assert "in 3 further conditions" in many.contradictions[3]
+
+
+CUT = MillingProcess(Cutter(2, 0.012), CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.5, "down"))
+
+
+def test_a_cut_is_made_as_it_tells():
+    own = OwnConditions(radial_width=1.2e-3, strategy="up", feed_per_tooth=0.1e-3)
+    made = own.process(CUT)
+    assert made.engagement == Engagement.from_immersion(0.1, "up")
+    assert made.feed_per_tooth == 0.1e-3
+    assert OwnConditions().process(CUT) is CUT
+    assert OwnConditions(strategy="up").process(CUT).engagement == Engagement.from_immersion(0.5, "up")
+    assert OwnConditions(radial_immersion=1.0).process(CUT).engagement == Engagement.from_immersion(1.0, "down")
+    with pytest.raises(InputError, match=r"radial_width_mm: found 13, allowed is at most the cutter's diameter of 12 mm"):
+        OwnConditions(radial_width=13e-3).process(CUT)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"radial_width": 0.0}, "radial_width"),
+        ({"radial_width": 1e-3, "radial_immersion": 0.5}, "one of the two"),
+        ({"radial_immersion": 1.2}, "share of the diameter"),
+        ({"strategy": "sideways"}, "one of up, down"),
+        ({"edge_state": "old"}, "one of new, worn"),
+    ],
+)
+def test_what_no_cut_tells(given, words):
+    with pytest.raises(InputError, match=words):
+        OwnConditions(**given)
+
+
+def test_cuts_that_are_made_alike():
+    """Without run-out nothing hangs on the feed."""
+    own = tuple(OwnConditions(strategy=s, feed_per_tooth=f) for s, f in (("up", 1e-4), ("", 1e-4), ("up", 2e-4), ("down", None)))
+    cuts = TestedCuts(np.full(4, 500.0), np.full(4, 1e-3), (Verdict.STABLE,) * 4, own=own)
+    assert [places.tolist() for places, _ in cuts.alike(CUT)] == [[0, 2], [1, 3]]
+    run_out = replace(CUT, cutter=Cutter(2, 0.012, runout=np.array([0.0, 5e-6])), feed_per_tooth=1e-4)
+    assert [places.tolist() for places, _ in cuts.alike(run_out)] == [[0], [1, 3], [2]]
 
 
 def test_the_same_cut_of_two_tables_counts_once_and_twice_within_one():

@@ -1,0 +1,82 @@
+"""Whether labels say something of a cut, or whether its probability is a guess from before the first of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from rcsa_ident.base.arrays import FloatArray
+from rcsa_ident.base.remarks import counted
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.stability.labels.cut_margins import points_of
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts
+
+#: How near the nearest label is to a cut that is covered, one length of the process away, and to one that is partly so, two lengths.
+_COVERED, _PARTLY = np.exp(-0.5), np.exp(-2.0)
+
+
+class Covered(StrEnum):
+    """Whether labels say something of a cut."""
+
+    YES = "yes"
+    PARTLY = "partly"
+    NO = "no"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TestedAnswers:
+    """What is believed of cuts.
+
+    `stable`, shape (n,): probability that each is called stable
+    `covered`: tuple of Covered, length n
+    """
+
+    __test__ = False  # a noun, though pytest looks for such names
+
+    stable: FloatArray
+    covered: tuple[Covered, ...]
+
+
+def covered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, near: FloatArray) -> tuple[Covered, ...]:
+    """Return whether labels cover each cut: never in a direction that has none, and partly at most with edges that have none.
+
+    `near`, shape (n,): how near the nearest label is, as of `LabelProcess.told`
+    """
+    directions = set(points_of(labels, process)[:, 2].tolist())
+    edges = {own.edge_state for own in labels.own}
+    found = []
+    for share, up, own in zip(near, points_of(asked, process)[:, 2], asked.own, strict=True):
+        if up not in directions or share < _PARTLY:
+            found.append(Covered.NO)
+        elif share < _COVERED or own.edge_state not in edges:
+            found.append(Covered.PARTLY)
+        else:
+            found.append(Covered.YES)
+    return tuple(found)
+
+
+def weight_of_labels(near: FloatArray) -> FloatArray:
+    """Return which share of their weight labels without physics keep, shape (n,): all of it near a label, none where labels end.
+
+    There physics goes on alone.
+    """
+    return np.clip((near - _PARTLY) / (_COVERED - _PARTLY), 0.0, 1.0)
+
+
+def uncovered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, cover: tuple[Covered, ...]) -> tuple[str, ...]:
+    """Return in words which cuts labels do not cover, and why."""
+    said = []
+    there, wanted = points_of(labels, process), points_of(asked, process)
+    for up, name in ((1.0, "up"), (0.0, "down")):
+        count = int(np.sum(wanted[:, 2] == up))
+        if count and up not in there[:, 2]:
+            of = counted(count, "cut")
+            said.append(f"no label was ever taken in {name} milling: of {of} the probability is what was believed before any label")
+    told = np.array([each is Covered.NO for each in cover]) & np.isin(wanted[:, 2], there[:, 2])
+    if told.any():
+        are = "is" if told.sum() == 1 else "are"
+        far = counted(int(told.sum()), "cut")
+        said.append(f"{far} {are} far from every label: the probability is that of the learnt tip alone")
+    return tuple(said)
