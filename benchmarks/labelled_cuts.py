@@ -153,7 +153,7 @@ class Pool:
         if found.without is None:
             return np.asarray(physics)
         without, near = found.without.told(found.without.features_of(self.cuts.at_places(some), PROCESS))
-        weight = (1.0 - found.trust) * weight_of_labels(near)
+        weight = weight_of_labels(near, found.trust)
         return np.asarray((1.0 - weight) * physics + weight * without)
 
 

@@ -45,8 +45,8 @@ def learn(
     tests: Annotated[
         Path | None,
         typer.Option(
-            help="CUTS.csv: labelled cuts (spindle_speed_rpm, axial_depth_mm, verdict stable|chatter|marginal; chatter_frequency_hz where "
-            "it was measured).",
+            help="CUTS.csv: labelled cuts (spindle_speed_rpm, axial_depth_mm, verdict stable|chatter|marginal; where they are known "
+            "chatter_frequency_hz, radial_width_mm, strategy, feed_per_tooth_mm, edge_state, session, verdict_2).",
         ),
     ] = None,
     out: Annotated[
@@ -131,12 +131,13 @@ def learn(
         chosen = METHODS[method]() if earlier is None else earlier.method
         learnt = learn_from_cuts(belief, tooling, spec, cuts, chosen, None if earlier is None else earlier.model, seed, map=pool.map_many)
     write_learnt_tip(out, learnt)
-    remarks += [*belief.remarks, *learnt.remarks]
+    remarks += [*belief.remarks, *cuts.notes, *learnt.remarks]
     summary = told(learnt)
     if json_:
         status = "suspect" if learnt.remarks else "converged"
         about = {"labels": len(cuts.verdict), "status": status, "effective_draws": learnt.posterior.effective, "believed": summary}
         about |= {"log_evidence": learnt.posterior.log_evidence, "method": learnt.method.name}
+        about |= {"weight_of_physics": learnt.trust, "left_out_log_scores": list(learnt.scores)}
         emit({**about, "warnings": remarks, "seconds": stages.seconds, "out": str(out)})
     else:
         from rcsa_ident.cli.tables import show_believed
@@ -145,6 +146,12 @@ def learn(
         for remark in remarks:
             warn(remark)
         effective = f"{learnt.posterior.effective:.0f} effective draws"
+        if learnt.scores:
+            physics, without = learnt.scores
+            say(
+                f"cuts left out, mean log score: physics {physics:.2f}, labels without physics {without:.2f}; "
+                f"weight of physics {learnt.trust:.2f}"
+            )
         say(f"written: {out} ({len(cuts.verdict)} labels, {effective}, {stages.seconds['labels']:.1f} s)")
     if learnt.remarks:
         raise typer.Exit(NOT_CONVERGED)

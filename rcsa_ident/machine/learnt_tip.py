@@ -153,7 +153,7 @@ class LearntTip(TipSource):
         if self.process is None:
             return TestedAnswers(found, (Covered.NO,) * found.size)
         without, near = self.process.told(self.process.features_of(cuts, process))
-        weight = (1.0 - self.trust) * weight_of_labels(near)
+        weight = weight_of_labels(near, self.trust)
         found = (1.0 - weight) * found + weight * without
         cover = covered(self.cuts, cuts, process, near)
         outside = ~np.isin(points_of(cuts, process)[:, 2], self.posterior.points[:, 2])

@@ -138,8 +138,10 @@ def beside_physics(
     held_out, features = np.empty(len(cuts.verdict)), without.features
     for places in groups:
         held_out[places] = without.without(places).told(features.at(places))[0]
-    physics, share = posterior.held_out, stable_share(cuts)
-    return without, trust_in(physics, held_out, share), (log_score(physics, share), log_score(held_out, share))
+    share = stable_share(cuts)
+    scores = log_score(posterior.held_out, share), log_score(held_out, share)
+    trust = trust_in(posterior.log_evidence - without.log_evidence, share.size * (scores[0] - scores[1]))
+    return without, trust, scores
 
 
 def _process(believed: Believed, tooling: Tooling, cut: CutSpec) -> MillingProcess:

@@ -30,7 +30,7 @@ def test_what_is_known_of_the_cuts():
 def test_forty_labels_teach():
     """Of few draws of the prior: cuts of speeds that were never learnt are told better than before."""
     cuts, training, model = read(CUTS), read(TRAINING), LabelModel()
-    z = np.random.default_rng(3).standard_normal((600, 8))
+    z = np.random.default_rng(3).standard_normal((1500, 8))
     pool = Pool(z, cuts, margins_of(cuts)(z).margin)
     places = np.flatnonzero(np.isin(cuts.spindle_speed, training.spindle_speed))
     before, after = (scores_after(pool, learnt, model)[1] for learnt in (np.zeros(0, dtype=int), places))

@@ -57,12 +57,16 @@ def covered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, near
     return tuple(found)
 
 
-def weight_of_labels(near: FloatArray) -> FloatArray:
-    """Return which share of their weight labels without physics keep, shape (n,): all of it near a label, none where labels end.
+def weight_of_labels(near: FloatArray, trust: float) -> FloatArray:
+    """Return the weight of labels without physics, shape (n,): 1 - trust near a label, its square where labels end.
 
-    There physics goes on alone.
+    There physics goes on, unless cuts that it had not seen refuted it.
+
+    `trust`: weight of physics near labels
     """
-    return np.clip((near - _PARTLY) / (_COVERED - _PARTLY), 0.0, 1.0)
+    inside = np.clip((near - _PARTLY) / (_COVERED - _PARTLY), 0.0, 1.0)
+    found: FloatArray = (1.0 - trust) * (1.0 - trust * (1.0 - inside))
+    return found
 
 
 def uncovered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, cover: tuple[Covered, ...]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rcsa_ident.base.arrays import FloatArray, frozen
 from rcsa_ident.base.errors import InputError, positive
+from rcsa_ident.base.remarks import counted
 from rcsa_ident.base.units import to_rpm
 from rcsa_ident.cutting.conditions import AnyEngagement, Engagement, Stepover
 from rcsa_ident.cutting.process import MillingProcess
@@ -183,6 +184,30 @@ class TestedCuts:
         """The same as shares of all verdicts on the cut, shape (n, 3)."""
         counts = self.counts
         return counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what labels of these kinds cannot teach, and on repeats that were judged differently."""
+        told = []
+        if self.verdict and len(set(self.verdict)) == 1 and self.verdict[0] is not Verdict.MARGINAL:
+            side = "deeper" if self.verdict[0] is Verdict.STABLE else "less deep"
+            told.append(
+                f"every cut is labelled {self.verdict[0]}: the labels say that limits are {side} than the cuts, and not by how much"
+            )
+        sessions = [own.session for own in self.own if own.session]
+        alone = sum(sessions.count(each) == 1 for each in sessions)
+        if alone:
+            told.append(f"{counted(alone, 'session')} of one cut: what a session adds is told from the cut by none of them")
+        rows = [(*row[:2], replace(row[3], session="", further=())) for row in self._rows]
+        groups = [{self.verdict[k] for k, row in enumerate(rows) if row == one} for one in dict.fromkeys(rows)]
+        differing = sum({Verdict.STABLE, Verdict.CHATTER} <= each for each in groups)
+        if differing:
+            told.append(f"{counted(differing, 'cut')} made again and judged differently: that is taken for noise of the labels")
+        directions = {own.strategy for own in self.own} - {""}
+        if len(directions) == 1:
+            (one,) = directions
+            told.append(f"all labels are of {one} milling: of the other direction they tell nothing")
+        return tuple(told)
 
     @property
     def contradictions(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rcsa_ident.stability.labels.coverage import Covered, covered, uncovered, weight_of_labels
 from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
@@ -26,4 +27,7 @@ def test_direction_edges_and_distance():
 
 
 def test_labels_keep_their_weight_where_they_are():
-    assert weight_of_labels(np.array([1.0, np.exp(-0.5), np.exp(-2.0), 0.0])).tolist() == [1.0, 1.0, 0.0, 0.0]
+    near = np.array([1.0, np.exp(-0.5), np.exp(-2.0), 0.0])
+    assert weight_of_labels(near, 0.0).tolist() == [1.0] * 4
+    assert weight_of_labels(near, 1.0).tolist() == [0.0] * 4
+    assert weight_of_labels(near, 0.8) == pytest.approx([0.2, 0.2, 0.04, 0.04])
