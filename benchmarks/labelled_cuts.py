@@ -32,18 +32,16 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.front.processes import workers
 from rcsa_ident.stability.discretisation import FullDiscretisation
-from rcsa_ident.stability.labels.coverage import weight_of_labels
+from rcsa_ident.stability.labels.averaging import trust_in, weight_of_labels
 from rcsa_ident.stability.labels.cut_margins import CutMargins, DrawnMargins, points_of
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, LabelPosterior, learn_labels
 from rcsa_ident.stability.labels.label_process import LabelProcess
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.next_test import most_telling
-from rcsa_ident.stability.labels.stacking import groups_of
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.tip_modes import TipModes
-from rcsa_ident.workflows.learn_from_cuts import beside_physics
 
 CUTS, TRAINING = (FILES / f"labelled_cuts_{name}.csv" for name in ("118", "training_40"))
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "labelled_cuts.md"
@@ -136,11 +134,9 @@ class Pool:
         effort = effort or Effort(further=0, rounds=0, kept=KEPT)
         first = self.z if effort.rounds == 0 else self.z[: effort.first]
         cuts, rng = self.cuts.at_places(some), np.random.default_rng(seed)
-        groups = groups_of(cuts)
-        groups = groups if len(groups) > 1 else []
         size = self.z.shape[1]
-        found = learn_labels(partial(self.margins, some), size, cuts, points_of(cuts, PROCESS), model, rng, effort, first, groups)
-        return Taught(found, *(beside_physics(cuts, PROCESS, found, groups, rng)[:2] if some.size else (None, 1.0)))
+        found = learn_labels(partial(self.margins, some), size, cuts, points_of(cuts, PROCESS), model, rng, effort, first)
+        return Taught(found, LabelProcess.learnt(cuts, PROCESS, rng) if some.size else None)
 
     def stable(self, found: LabelPosterior, model: LabelModel, some: FloatArray) -> FloatArray:
         """Probability of each draw that some of the cuts are called stable, by physics, shape (r, n)."""
@@ -159,11 +155,15 @@ class Pool:
 
 @dataclass(frozen=True, eq=False)
 class Taught:
-    """What labels taught, with and without physics, and the weight of physics."""
+    """What labels taught, with and without physics."""
 
     posterior: LabelPosterior
     without: LabelProcess | None
-    trust: float
+
+    @property
+    def trust(self) -> float:
+        """Weight of physics."""
+        return 1.0 if self.without is None else trust_in(self.posterior.log_evidence - self.without.log_evidence)
 
 
 def chosen_on(pool: Pool, learnt: FloatArray) -> list[tuple[float, float, float, float]]:

@@ -16,7 +16,7 @@ from api.security import Guarded, WhoAsks
 from api.stores.entities import digest_of
 from rcsa_ident.base.errors import InputError
 from rcsa_ident.base.units import to_rpm
-from rcsa_ident.io.settings.tested_cuts import tested_cuts_of
+from rcsa_ident.io.settings.tested_cuts import own_columns, tested_cuts_of
 from rcsa_ident.io.unread_columns import left_aside, reading_tables
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
@@ -78,6 +78,12 @@ async def tested_cuts(request: Request) -> TestedCutsAnswer:
         # what is written in rev/min and mm comes back so
         columns = ([float(f"{value:.12g}") for value in values] for values in (to_rpm(found.spindle_speed), 1e3 * found.axial_depth))
         cuts = [tested_cut(*row) for row in enumerate(zip(*columns, found.verdict, strict=True))]
-        return TestedCutsAnswer(cuts=cuts, warnings=warnings)
+        own = own_columns(found)
+        told = (
+            [f"{', '.join(own)}: left aside here, where every cut is asked with the width, direction and feed of the question"]
+            if own
+            else []
+        )
+        return TestedCutsAnswer(cuts=cuts, warnings=[*warnings, *told])
 
     return await run_in_threadpool(read)

@@ -137,7 +137,7 @@ def learn(
         status = "suspect" if learnt.remarks else "converged"
         about = {"labels": len(cuts.verdict), "status": status, "effective_draws": learnt.posterior.effective, "believed": summary}
         about |= {"log_evidence": learnt.posterior.log_evidence, "method": learnt.method.name}
-        about |= {"weight_of_physics": learnt.trust, "left_out_log_scores": list(learnt.scores)}
+        about |= {"weight_of_physics": learnt.trust}
         emit({**about, "warnings": remarks, "seconds": stages.seconds, "out": str(out)})
     else:
         from rcsa_ident.cli.tables import show_believed
@@ -146,12 +146,9 @@ def learn(
         for remark in remarks:
             warn(remark)
         effective = f"{learnt.posterior.effective:.0f} effective draws"
-        if learnt.scores:
-            physics, without = learnt.scores
-            say(
-                f"cuts left out, mean log score: physics {physics:.2f}, labels without physics {without:.2f}; "
-                f"weight of physics {learnt.trust:.2f}"
-            )
+        if learnt.process is not None:
+            physics, without = learnt.posterior.log_evidence, learnt.process.log_evidence
+            say(f"log evidence: physics {physics:.1f}, labels without physics {without:.1f}; weight of physics {learnt.trust:.2f}")
         say(f"written: {out} ({len(cuts.verdict)} labels, {effective}, {stages.seconds['labels']:.1f} s)")
     if learnt.remarks:
         raise typer.Exit(NOT_CONVERGED)

@@ -15,7 +15,8 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers, covered, weight_of_labels
+from rcsa_ident.stability.labels.averaging import trust_in, weight_of_labels
+from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers, covered
 from rcsa_ident.stability.labels.cut_margins import CutMargins, points_of
 from rcsa_ident.stability.labels.label_posterior import FEWEST, LabelModel, LabelPosterior
 from rcsa_ident.stability.labels.label_process import LabelProcess
@@ -47,8 +48,6 @@ class LearntTip(TipSource):
     `method`: that the limits were computed by: their error is that method's, too, so that no other one takes its place
     `cuts`: those that were learnt from
     `process`: the labels without physics; None without labels
-    `trust`: weight of physics beside that process, as cuts told it that neither had seen
-    `scores`: mean logarithm of the probability of those cuts' labels, by physics and without it; empty where no cuts could be left out
     """
 
     prior: UncertainTip
@@ -58,8 +57,6 @@ class LearntTip(TipSource):
     cuts: TestedCuts
     posterior: LabelPosterior
     process: LabelProcess | None = None
-    trust: float = 1.0
-    scores: tuple[float, ...] = ()
 
     @property
     def band(self) -> None:
@@ -78,6 +75,11 @@ class LearntTip(TipSource):
         if self.process is not None and self.process.log_evidence - self.posterior.log_evidence > _BETTER:
             said.append(WORSE.format(self.process.log_evidence, self.posterior.log_evidence))
         return (*self.cuts.contradictions, *said)
+
+    @property
+    def trust(self) -> float:
+        """Weight of physics near labels."""
+        return 1.0 if self.process is None else trust_in(self.posterior.log_evidence - self.process.log_evidence)
 
     @property
     def thin(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,10 +18,9 @@ from rcsa_ident.machine.machine import TipSource
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import Tooling
 from rcsa_ident.stability.labels.cut_margins import CutMargins, DrawnMargins
-from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, LabelPosterior, learn_labels
+from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, learn_labels
 from rcsa_ident.stability.labels.label_process import LabelProcess
 from rcsa_ident.stability.labels.next_test import most_telling
-from rcsa_ident.stability.labels.stacking import groups_of, log_score, stable_share, trust_in
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.lobes import both_directions
@@ -115,33 +113,10 @@ def learn_from_cuts(
     model = model or LabelModel()
     # the mean of the coefficients is that which was believed; spreads that a cut names for itself belong to it
     process = _process(believed, tooling, cut)
-    margins, groups = CutMargins(believed.prior, process, method, cuts), groups_of(cuts)
-    groups = groups if len(groups) > 1 else []
-    size, rng = believed.prior.size, np.random.default_rng(seed)
-    posterior = learn_labels(_Mapped(margins, map), size, cuts, margins.points, model, rng, effort, groups=groups)
-    told = (believed.prior, process.coefficients, method, model, cuts, posterior)
-    if not cuts.verdict:
-        return LearntTip(*told)
-    return LearntTip(*told, *beside_physics(cuts, process, posterior, groups, rng))
-
-
-def beside_physics(
-    cuts: TestedCuts, process: MillingProcess, posterior: LabelPosterior, groups: Sequence[FloatArray], rng: np.random.Generator
-) -> tuple[LabelProcess, float, tuple[float, ...]]:
-    """Return the labels without physics, the weight of physics beside them, and the log score of both, as `LearntTip` takes them.
-
-    `groups`: places of cuts that were left out together, whose labels tell the weight; without any it is 1
-    """
-    without = LabelProcess.learnt(cuts, process, rng)
-    if not groups:
-        return without, 1.0, ()
-    held_out, features = np.empty(len(cuts.verdict)), without.features
-    for places in groups:
-        held_out[places] = without.without(places).told(features.at(places))[0]
-    share = stable_share(cuts)
-    scores = log_score(posterior.held_out, share), log_score(held_out, share)
-    trust = trust_in(posterior.log_evidence - without.log_evidence, share.size * (scores[0] - scores[1]))
-    return without, trust, scores
+    margins, rng = CutMargins(believed.prior, process, method, cuts), np.random.default_rng(seed)
+    posterior = learn_labels(_Mapped(margins, map), believed.prior.size, cuts, margins.points, model, rng, effort)
+    without = LabelProcess.learnt(cuts, process, rng) if cuts.verdict else None
+    return LearntTip(believed.prior, process.coefficients, method, model, cuts, posterior, without)
 
 
 def _process(believed: Believed, tooling: Tooling, cut: CutSpec) -> MillingProcess:

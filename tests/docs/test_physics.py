@@ -34,10 +34,10 @@ from rcsa_ident.machine.workpiece_side import gives_way
 from rcsa_ident.observer.force_model import RandomWalk, TeethResonators
 from rcsa_ident.observer.transfer_function import SampledModes
 from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.stability.labels.averaging import trust_in
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
 from rcsa_ident.stability.labels.next_test import most_telling
-from rcsa_ident.stability.labels.stacking import trust_in
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.surface_error import surface_location_error
@@ -295,7 +295,7 @@ def test_labels_and_the_smooth_error():
     found = LimitDiscrepancy().covariance(points, points)
     apart = np.log(0.8) ** 2 / (2 * 0.3**2) + np.log(2.0) ** 2 / 2
     np.testing.assert_allclose(found[0, 1], 0.35**2 * 0.3 * np.exp(-apart))
-    assert trust_in(5.0, -2.0) == pytest.approx(1.0 / (1.0 + np.exp(-0.75) / 4.0))
+    assert trust_in(3.0) == pytest.approx(1.0 / (1.0 + np.exp(-1.5) / 4.0))
     stable = RNG.uniform(0.02, 0.98, (50, 6))
 
     def entropy(p: np.ndarray) -> np.ndarray:

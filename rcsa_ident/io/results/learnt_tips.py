@@ -105,8 +105,6 @@ def _process_to_json(learnt: LearntTip) -> dict[str, Any]:
     features = own.features
     return {
         "without_physics": {
-            "weight_of_physics": learnt.trust,
-            "log_scores": list(learnt.scores),
             "log_evidence": own.log_evidence,
             "middle": own.middle.tolist(),
             "sessions": list(own.sessions),
@@ -119,10 +117,10 @@ def _process_to_json(learnt: LearntTip) -> dict[str, Any]:
     }
 
 
-def _process_of(top: Table) -> dict[str, Any]:
+def _process_of(top: Table) -> LabelProcess | None:
     """The same as `LearntTip` takes it."""
     if "without_physics" not in top.data:
-        return {}
+        return None
     table = top.table("without_physics")
     numbers, kinds, counts, drawn = (_matrix(table, key, n) for key, n in (("numbers", 4), ("kinds", 2), ("counts", 3), ("draws", None)))
     session = np.array(table.numbers("session", None))
@@ -131,9 +129,7 @@ def _process_of(top: Table) -> dict[str, Any]:
             table.refuse(key, f"{size} rows", f"as many as numbers: {len(numbers)}")
     names = tuple(str(each) for each in table.value("sessions", "a list of names"))
     features = CutFeatures(numbers, kinds, session)
-    process = LabelProcess(features, np.array(table.numbers("middle", 4)), names, counts, drawn, table.number("log_evidence"))
-    scores = tuple(table.numbers("log_scores", None)) if table.data.get("log_scores") else ()
-    return {"process": process, "trust": table.number("weight_of_physics", least=0.0, most=1.0), "scores": scores}
+    return LabelProcess(features, np.array(table.numbers("middle", 4)), names, counts, drawn, table.number("log_evidence"))
 
 
 def believed(learnt: LearntTip) -> dict[str, Any]:
@@ -189,7 +185,7 @@ def learnt_tip_of(data: Any, where: str) -> LearntTip:
     with found.naming({}):
         posterior = LabelPosterior(z, points, errors, found.number("log_evidence"), found.number("effective_draws", above=0.0))
     method = METHODS[top.text("method", choices=tuple(METHODS))]()
-    return LearntTip(prior, workpiece.coefficients, method, model, _cuts(top), posterior, **_process_of(top))
+    return LearntTip(prior, workpiece.coefficients, method, model, _cuts(top), posterior, _process_of(top))
 
 
 def _cuts(top: Table) -> TestedCuts:

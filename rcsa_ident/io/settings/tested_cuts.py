@@ -148,13 +148,18 @@ def _chatter(table: TextTable) -> FloatArray:
 
 def write_tests(path: str | Path, cuts: TestedCuts, answers: TestedAnswers) -> None:
     """Write TESTS.csv: each tested cut with the probability that it is stable, and whether labels cover it."""
-    shown = [column for column in OWN if any(told(own, column) for own in cuts.own)]
+    shown = own_columns(cuts)
     rows = zip(to_rpm(cuts.spindle_speed), 1e3 * cuts.axial_depth, cuts.verdict, cuts.own, answers.stable, answers.covered, strict=True)
     lines = [
         ",".join([f"{speed:.10g}", f"{depth:.10g}", verdict, *(told(own, column) for column in shown), f"{p:.6g}", cover])
         for speed, depth, verdict, own, p, cover in rows
     ]
     write_text(path, "\n".join([",".join((*COLUMNS, *shown, "probability_stable", "covered")), *lines, ""]))
+
+
+def own_columns(cuts: TestedCuts) -> list[str]:
+    """Return the columns of `OWN` in which any cut tells something of itself."""
+    return [column for column in OWN if any(told(own, column) for own in cuts.own)]
 
 
 def told(own: OwnConditions, column: str) -> str:

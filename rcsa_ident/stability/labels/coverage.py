@@ -14,7 +14,7 @@ from rcsa_ident.stability.labels.cut_margins import points_of
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts
 
 #: How near the nearest label is to a cut that is covered, one length of the process away, and to one that is partly so, two lengths.
-_COVERED, _PARTLY = np.exp(-0.5), np.exp(-2.0)
+COVERED, PARTLY = np.exp(-0.5), np.exp(-2.0)
 
 
 class Covered(StrEnum):
@@ -48,25 +48,13 @@ def covered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, near
     edges = {own.edge_state for own in labels.own}
     found = []
     for share, up, own in zip(near, points_of(asked, process)[:, 2], asked.own, strict=True):
-        if up not in directions or share < _PARTLY:
+        if up not in directions or share < PARTLY:
             found.append(Covered.NO)
-        elif share < _COVERED or own.edge_state not in edges:
+        elif share < COVERED or own.edge_state not in edges:
             found.append(Covered.PARTLY)
         else:
             found.append(Covered.YES)
     return tuple(found)
-
-
-def weight_of_labels(near: FloatArray, trust: float) -> FloatArray:
-    """Return the weight of labels without physics, shape (n,): 1 - trust near a label, its square where labels end.
-
-    There physics goes on, unless cuts that it had not seen refuted it.
-
-    `trust`: weight of physics near labels
-    """
-    inside = np.clip((near - _PARTLY) / (_COVERED - _PARTLY), 0.0, 1.0)
-    found: FloatArray = (1.0 - trust) * (1.0 - trust * (1.0 - inside))
-    return found
 
 
 def uncovered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, cover: tuple[Covered, ...]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,7 +55,6 @@ class LabelPosterior:
     `error`, shape (r, n): of the logarithm of the limit, at these points
     `log_evidence`: logarithm of the probability of all labels before they were seen
     `effective`: draws with equal weights that would tell as much as the weighted ones that these were chosen from
-    `held_out`, shape (m,): probability that each cut is called stable, by draws that know nothing of the cuts left out with it
     """
 
     z: FloatArray
@@ -63,7 +62,6 @@ class LabelPosterior:
     error: FloatArray
     log_evidence: float
     effective: float
-    held_out: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         for name in ("z", "points", "error"):
@@ -85,7 +83,6 @@ def learn_labels(
     rng: np.random.Generator,
     effort: Effort | None = None,
     first: FloatArray | None = None,
-    groups: Sequence[FloatArray] = (),
 ) -> LabelPosterior:
     """Return what is believed after labels.
 
@@ -104,8 +101,6 @@ def learn_labels(
     effort : Effort, optional
     first : array, shape (n, size), optional
         The first round, drawn from the prior, where its margins are known already.
-    groups : sequence of arrays of places, optional
-        Cuts that are left out together.
 
     Notes
     -----
@@ -136,8 +131,7 @@ def learn_labels(
     first = np.array([rng.choice(_ERRORS, p=each / each.sum()) for each in share])
     moved = elliptical_slices(number[first], lambda u: joint.of_each(drawn, u @ root.T), rng, _MOVES)
     order = rng.permutation(effort.kept)
-    held_out = joint.held_out(tips, found.weight, (number @ root.T)[: _ERRORS // 4], groups)
-    return LabelPosterior(found.z[chosen][order], where, (moved @ root.T)[order], found.log_evidence, found.effective, held_out)
+    return LabelPosterior(found.z[chosen][order], where, (moved @ root.T)[order], found.log_evidence, found.effective)
 
 
 def _even_normals(size: int, rng: np.random.Generator) -> FloatArray:
@@ -166,33 +160,15 @@ class _Joint:
 
     def of_all(self, tips: DrawnMargins, error: FloatArray) -> FloatArray:
         """Of each tip with each error, shapes (d, n), (e, p) -> (d, e)."""
-        return self.of_all_at(tips, error, np.arange(len(self.place)))
-
-    def of_all_at(self, tips: DrawnMargins, error: FloatArray, places: FloatArray) -> FloatArray:
-        """The same of some of the labels."""
         found = np.zeros((len(tips.margin), len(error)))
-        for k in places:
-            margin = tips.margin[:, k, None] + error[:, self.place[k]]
+        for k, at in enumerate(self.place):
+            margin = tips.margin[:, k, None] + error[:, at]
             found += self.noise.log_likelihood(self.cuts.at_places(np.array([k])), margin[..., None])
-        return found + self.noise.heard(self.cuts.at_places(places), tips.chatter[:, places])[:, None]
+        return found + self.noise.heard(self.cuts, tips.chatter)[:, None]
 
     def of_each(self, tips: DrawnMargins, error: FloatArray) -> FloatArray:
         """Of each tip with its own error, shapes (d, n), (d, p) -> (d,)."""
         return self.noise.log_likelihood(self.cuts, tips.margin + error[:, self.place]) + self.noise.heard(self.cuts, tips.chatter)
-
-    def held_out(self, tips: DrawnMargins, weight: FloatArray, error: FloatArray, groups: Sequence[FloatArray]) -> FloatArray:
-        """Probability that each cut is called stable, by tips and errors weighted as if its group had not been seen, shape (n,)."""
-        found = np.zeros(len(self.place) if groups else 0)
-        own = [self.of_all_at(tips, error, places) for places in groups]
-        total = np.sum(own, axis=0)
-        # what weighs a tip beside the labels: prior over the density that it was drawn from
-        before = np.log(np.maximum(weight, 1e-300)) - (_mean(total) if groups else 0.0)
-        for places, mine in zip(groups, own, strict=True):
-            left = before[:, None] + total - mine
-            share = np.exp(left - logsumexp(left))
-            for k in places:
-                found[k] = np.sum(share * self.noise.stable(tips.margin[:, k, None] + error[:, self.place[k]]))
-        return found
 
 
 def elliptical_slices(

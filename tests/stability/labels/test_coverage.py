@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from rcsa_ident.stability.labels.coverage import Covered, covered, uncovered, weight_of_labels
+from rcsa_ident.stability.labels.coverage import Covered, covered, uncovered
 from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
 from tests.stability.labels.test_tested_cuts import CUT
 
@@ -24,10 +23,3 @@ def test_direction_edges_and_distance():
         "1 cut is far from every label: the probability is that of the learnt tip alone",
     )
     assert uncovered(labels, labels, CUT, (Covered.YES,)) == ()
-
-
-def test_labels_keep_their_weight_where_they_are():
-    near = np.array([1.0, np.exp(-0.5), np.exp(-2.0), 0.0])
-    assert weight_of_labels(near, 0.0).tolist() == [1.0] * 4
-    assert weight_of_labels(near, 1.0).tolist() == [0.0] * 4
-    assert weight_of_labels(near, 0.8) == pytest.approx([0.2, 0.2, 0.04, 0.04])

@@ -18,7 +18,7 @@ EFFORT = Effort(2000, 1000, 2, 1500)
 S, C = Verdict.STABLE, Verdict.CHATTER
 
 
-def learnt(cuts, seed=1, groups=()):
+def learnt(cuts, seed=1):
     """From a limit of 1 mm, its logarithm 0.3 z0 everywhere and 0.3 z1 more above 700 rad/s; chatter at 5000 rad/s times e^(0.1 z1)."""
 
     def margins(z):
@@ -26,7 +26,7 @@ def learnt(cuts, seed=1, groups=()):
         log = np.log(1e-3) + 0.3 * z[:, :1] + 0.3 * z[:, 1:2] * high
         return DrawnMargins(log - np.log(cuts.axial_depth), np.tile(5000.0 * np.exp(0.1 * z[:, 1:2]), cuts.axial_depth.size))
 
-    return learn_labels(margins, 2, cuts, points(cuts.spindle_speed), MODEL, np.random.default_rng(seed), EFFORT, groups=groups)
+    return learn_labels(margins, 2, cuts, points(cuts.spindle_speed), MODEL, np.random.default_rng(seed), EFFORT)
 
 
 def brute(cuts, model):
@@ -91,21 +91,6 @@ def test_the_order_of_labels_and_the_seed():
     one, two = (learnt(TestedCuts(speed, depth, (S, C, C)).at_places(np.array(order))) for order in ((0, 1, 2), (2, 0, 1)))
     assert np.allclose(one.z, two.z)
     assert np.allclose(one.error, two.error)
-
-
-def test_cuts_that_are_left_out_are_told_as_if_they_had_not_been_seen():
-    """Beside learning from the others alone."""
-    speed, depth = np.array([600.0, 600.0, 800.0, 800.0]), np.array([0.8, 1.3, 1.5, 1.0]) * 1e-3
-    cuts, groups = TestedCuts(speed, depth, (S, C, C, S)), [np.array([0, 1]), np.array([2, 3])]
-    held_out = learnt(cuts, groups=groups).held_out
-    for k, (left, rest) in enumerate((groups, groups[::-1])):
-        other = learnt(cuts.at_places(rest))
-        error = other.errors(MODEL.discrepancy, points(speed[left[:1]]))
-        z = other.z
-        for place in left:
-            log = np.log(1e-3) + 0.3 * z[:, 0] + 0.3 * z[:, 1] * (speed[place] > 700.0) + error[:, 0]
-            expected = MODEL.noise.stable(log - np.log(depth[place])).mean()
-            assert held_out[place] == pytest.approx(expected, abs=0.05), k
 
 
 def test_elliptical_slices_leave_a_posterior_as_it_is():
