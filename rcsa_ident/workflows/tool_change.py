@@ -25,7 +25,7 @@ from rcsa_ident.machine.speed_dependence import Tips, tips_over_speed
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import BareCutter, Tooling
 from rcsa_ident.stability.discretisation import FullDiscretisation
-from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers
+from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers, unlabelled
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.lobes import (
@@ -239,10 +239,12 @@ class ToolChange:
     def remarks(self, lobes: StabilityLobes) -> tuple[str, ...]:
         """Return what speaks against limits."""
         band = self.machine.band
+        labels = unlabelled(self.machine.posterior.points, self.process) if isinstance(self.machine, LearntTip) else ()
         outside = None if band is None else _outside_band(lobes, band)
         said = [
             *self.tooling.remarks,
             *self.machine.remarks,
+            *labels,
             *lobes.warnings,
             *self._beyond(lobes),
             *([outside] if outside else []),

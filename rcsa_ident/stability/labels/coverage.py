@@ -11,8 +11,10 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.remarks import counted
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.stability.labels.cut_margins import points_of
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts
+from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 
+#: Ratio of widths up to which labels of one width tell of another.
+_WIDER = 1.6
 #: How near the nearest label is to a cut that is covered, one length of the process away, and to one that is partly so, two lengths.
 COVERED, PARTLY = np.exp(-0.5), np.exp(-2.0)
 
@@ -55,6 +57,28 @@ def covered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, near
         else:
             found.append(Covered.YES)
     return tuple(found)
+
+
+def unlabelled(points: FloatArray, process: MillingProcess) -> tuple[str, ...]:
+    """Return in words how a cut that is asked about differs from all labelled ones.
+
+    `points`, shape (n, 3): speeds, immersions and directions of the labels, as of `points_of`
+    """
+    if not len(points):
+        return ()
+    ((_, share, up),) = points_of(TestedCuts(np.ones(1), np.ones(1), (Verdict.MARGINAL,)), process)
+    said = []
+    if up not in points[:, 2]:
+        said.append(
+            f"no label was ever taken in {'up' if up else 'down'} milling: limits there are what the labels of the other direction say"
+        )
+    low, high = float(points[:, 1].min()), float(points[:, 1].max())
+    if not low / _WIDER < share < high * _WIDER:
+        widths = [f"{1e3 * each * process.cutter.diameter:.3g}" for each in (share, low, high)]
+        said.append(
+            f"the cut is {widths[0]} mm wide, labels are of widths from {widths[1]} to {widths[2]} mm: limits there are extrapolated"
+        )
+    return tuple(said)
 
 
 def uncovered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, cover: tuple[Covered, ...]) -> tuple[str, ...]:

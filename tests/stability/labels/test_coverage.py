@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.stability.labels.coverage import Covered, covered, uncovered
+from rcsa_ident.stability.labels.coverage import Covered, covered, uncovered, unlabelled
 from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
 from tests.stability.labels.test_tested_cuts import CUT
 
@@ -23,3 +23,14 @@ def test_direction_edges_and_distance():
         "1 cut is far from every label: the probability is that of the learnt tip alone",
     )
     assert uncovered(labels, labels, CUT, (Covered.YES,)) == ()
+
+
+def test_a_question_that_differs_from_all_labels():
+    points = np.array([[500.0, 0.05, 1.0], [600.0, 0.1, 1.0]])
+    wide = OwnConditions(radial_immersion=0.2, strategy="up").process(CUT)
+    assert unlabelled(points, wide) == ("the cut is 2.4 mm wide, labels are of widths from 0.6 to 1.2 mm: limits there are extrapolated",)
+    down = OwnConditions(radial_immersion=0.1, strategy="down").process(CUT)
+    (said,) = unlabelled(points, down)
+    assert said.startswith("no label was ever taken in down milling")
+    assert unlabelled(points, OwnConditions(radial_immersion=0.1, strategy="up").process(CUT)) == ()
+    assert unlabelled(np.zeros((0, 3)), CUT) == ()
