@@ -47,17 +47,22 @@ class LabelNoise:
         return found
 
     def log_likelihood(self, cuts: TestedCuts, margin: FloatArray) -> FloatArray:
-        """Return the log probability of all labels together, shape (...); verdicts of several on one cut share its weight.
+        """Return the log probability of all verdicts together, shape (...).
 
         `cuts`: TestedCuts, n of them
         `margin` [-], shape (..., n): log(limit / depth) of each cut, or what stands for it where islands are
         """
         found = np.zeros(margin.shape[:-1])
-        for share, p in zip(cuts.shares.T, (self.stable, self._marginal, lambda m: self.stable(-m)), strict=True):
-            where = share > 0.0
+        for verdict, count in zip(ORDINAL, cuts.counts.T, strict=True):
+            where = count > 0.0
             if where.any():
-                found += np.log(p(margin[..., where])) @ share[where]
+                found += np.log(self._probability(verdict, margin[..., where])) @ count[where]
         return found
+
+    def _probability(self, verdict: Verdict, margin: FloatArray) -> FloatArray:
+        if verdict is Verdict.MARGINAL:
+            return self._marginal(margin)
+        return self.stable(margin if verdict is Verdict.STABLE else -margin)
 
     def heard(self, cuts: TestedCuts, chatter: FloatArray) -> FloatArray:
         """Return the log density of the measured chatter frequencies over that of any other line of a spectrum, shape (...).

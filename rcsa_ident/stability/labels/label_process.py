@@ -71,7 +71,7 @@ class LabelProcess:
 
     `features`: of the labelled cuts, n of them, less `middle`, shape (4,)
     `sessions`: names of the sessions
-    `counts`, shape (n, 3): shares of the verdicts on each that call it stable, marginal and chatter: several on one cut share its weight
+    `counts`, shape (n, 3): how many verdicts call each stable, marginal and chatter
     `drawn`, shape (r, 15): logarithms of what it does not know of itself, each draw as probable as the other
     `log_evidence`: logarithm of the probability of all verdicts before they were seen
     """
@@ -95,7 +95,7 @@ class LabelProcess:
         """
         sessions = tuple(dict.fromkeys(own.session for own in cuts.own if own.session))
         middle = CutFeatures.of(cuts, process, np.zeros(4), sessions).numbers.mean(axis=0)
-        features, counts = CutFeatures.of(cuts, process, middle, sessions), cuts.shares
+        features, counts = CutFeatures.of(cuts, process, middle, sessions), cuts.counts
 
         def evidence(z: FloatArray) -> FloatArray:
             return np.array([_laplace(covariance(each, features, features), counts)[0] for each in _told(z)])

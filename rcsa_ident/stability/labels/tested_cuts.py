@@ -180,12 +180,6 @@ class TestedCuts:
         return np.array([[each.count(v) for v in ORDINAL] for each in votes], dtype=float).reshape(-1, len(ORDINAL))
 
     @property
-    def shares(self) -> FloatArray:
-        """The same as shares of all verdicts on the cut, shape (n, 3)."""
-        counts = self.counts
-        return counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on what labels of these kinds cannot teach, and on repeats that were judged differently."""
         told = []

@@ -54,10 +54,10 @@ def test_all_labels_multiply():
         assert found == pytest.approx(sum(single))
 
 
-def test_verdicts_of_several_on_one_cut_share_its_weight():
+def test_verdicts_of_several_on_one_cut_are_several_readings():
     own = (OwnConditions(further=(Verdict.CHATTER,)),)
     two = TestedCuts(np.array([800.0]), np.array([1e-3]), (Verdict.STABLE,), own=own)
-    assert NOISE.log_likelihood(two, np.array([0.1])) == pytest.approx(0.5 * (of("stable", 0.1) + of("chatter", 0.1)))
+    assert NOISE.log_likelihood(two, np.array([0.1])) == pytest.approx(of("stable", 0.1) + of("chatter", 0.1))
 
 
 def test_a_measured_chatter_frequency():
