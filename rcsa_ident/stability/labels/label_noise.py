@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError, positive
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts
+from rcsa_ident.stability.labels.tested_cuts import ORDINAL, TestedCuts, Verdict
 
 
 @dataclass(frozen=True, slots=True)
