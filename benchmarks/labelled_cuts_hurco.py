@@ -203,11 +203,11 @@ def page(cuts: TestedCuts, found: dict[str, LeftOut]) -> str:
     return f"""# What two experts' verdicts teach
 
 {len(cuts.verdict)} real cuts of a milling machine with one long, worn tool of half an inch and five teeth, in steel, 4 to 10 % of the
-diameter wide, up and down, at seven speeds, judged by two experts as stable, between or chatter. They lie beside the project, not in it. No modal
-test is known: the tip is believed to have one mode in each direction, 1500 Hz ± 40 %, damping ratio 0.03 ± 50 %, 8 N/µm ± 60 %; K_tc
-2100 MPa ± 20 %. Scores are over the {clear} cuts on which the experts are clear: the sum of both verdicts (0, 1, 2) is at most 1, or at
-least 3. Each group is told by all cuts of the others. Log scores are means of the natural logarithm of the probability of what was seen;
-the calibration error is the mean difference between probability and share in ten bins.
+diameter wide, up and down, at seven speeds, judged by two experts as stable, between or chatter. They lie beside the project, not in it.
+No modal test is known: the tip is believed to have one mode in each direction, 1500 Hz ± 40 %, damping ratio 0.03 ± 50 %,
+8 N/µm ± 60 %; K_tc 2100 MPa ± 20 %. Scores are over the {clear} cuts on which the experts are clear: the sum of both verdicts (0, 1, 2) is
+at most 1, or at least 3. Each group is told by all cuts of the others. Log scores are means of the natural logarithm of the probability of
+what was seen; the calibration error is the mean difference between probability and share in ten bins.
 
 {text}
 

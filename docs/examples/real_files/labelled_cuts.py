@@ -4,7 +4,7 @@
 
 Others made 118 cuts over speed and depth and labelled each as stable or chatter; 40 training cuts and the probable
 modes before them were published with it (gengxiangc/BSLD on GitHub). Here the forty teach modes, coefficients and a
-smooth error of the limit, all limits by full discretisation; scored are the cuts that were not learned from.
+smooth error of the limit, each cut asked by full discretisation; scored are the cuts that were not learned from.
 """
 
 import matplotlib.pyplot as plt
@@ -13,9 +13,11 @@ from kept import real_files
 
 import rcsa_ident as ri
 from rcsa_ident.base.units import to_rpm
-from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, learn_labels
+from rcsa_ident.setup.tooling import BareCutter
+from rcsa_ident.stability.labels.label_posterior import Effort
 from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
-from rcsa_ident.stability.labels.uncertain_tip import TipLimits, UncertainTip
+from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
+from rcsa_ident.workflows.learn_from_cuts import Believed, learn_from_cuts
 
 files = real_files("https://github.com/gengxiangc/BSLD", "labelled_cuts.png", "labelled_cuts_118.csv", "labelled_cuts_training_40.csv")
 if files:
@@ -34,17 +36,17 @@ if files:
         spreads.append((80.0 / hertz, 0.008 / zeta, 2e6 / stiffness))
     prior = UncertainTip.independent(ri.TipModes.of(models), np.array(spreads).T, (1.5 / 10.95, 0.5 / 1.76))
     half = ri.Engagement.from_immersion(0.5, "down")
-    cut = ri.MillingProcess(ri.Cutter(2, 0.012), ri.CuttingCoefficients(10.95e8, 1.76 / 10.95), half)
-    limits, model = TipLimits(prior, cut, ri.FullDiscretisation(tolerance=1e-2), 12e-3), LabelModel()
-    found = learn_labels(limits, prior.size, training, model, np.random.default_rng(1), Effort(first=300, further=100, rounds=2, kept=50))
+    tooling, cut = BareCutter("two teeth", ri.Cutter(2, 0.012)), ri.CutSpec(half)
+    believed, method = Believed(prior, ri.CuttingCoefficients(10.95e8, 1.76 / 10.95)), ri.FullDiscretisation(tolerance=1e-2)
+    learnt = learn_from_cuts(believed, tooling, cut, training, method, effort=Effort(first=300, further=100, rounds=2, kept=50))
 
-    speeds, place = np.unique(every.spindle_speed, return_inverse=True)
-    drawn = limits(found.z, speeds).log_limit + found.errors(model.discrepancy, speeds)
-    stable = model.noise.stable(drawn[:, place] - np.log(every.axial_depth)).mean(axis=0)
+    process, speeds = cut.process(tooling.cutter, learnt.workpiece), np.unique(every.spindle_speed)
+    drawn, _ = learnt.drawn_limits(process, speeds, 12e-3, 50)
+    stable = learnt.answers(process, every).stable
     right = (stable > 0.5) == every.seen(Verdict.STABLE)
 
     fig, ax = plt.subplots(figsize=(8.0, 4.4), layout="constrained")
-    low, middle, high = 1e3 * np.exp(np.quantile(drawn, (0.05, 0.5, 0.95), axis=0))
+    low, middle, high = 1e3 * np.quantile(drawn, (0.05, 0.5, 0.95), axis=0, method="nearest")
     ax.fill_between(to_rpm(speeds), low, high, color="C0", alpha=0.2, lw=0.0, label="limit, 90 % of the draws")
     ax.plot(to_rpm(speeds), middle, label="limit, median")
     for verdict, mark, colour in ((Verdict.STABLE, "o", "C2"), (Verdict.CHATTER, "x", "C1")):
@@ -55,6 +57,6 @@ if files:
     ax.legend(ncols=3, loc="upper right")
 
     print(f"told right: {right.sum()} of 118, {right[unseen].sum()} of the {unseen.sum()} unseen (published: 83.1 % and 79.7 %)")
-    print(f"effective draws: {found.effective:.0f}")
+    print(f"effective draws: {learnt.posterior.effective:.0f}")
     assert unseen.sum() == 79
     assert right.mean() > 0.80
