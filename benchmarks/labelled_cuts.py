@@ -32,7 +32,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.front.processes import workers
 from rcsa_ident.stability.discretisation import FullDiscretisation
-from rcsa_ident.stability.labels.averaging import trust_in, weight_of_labels
+from rcsa_ident.stability.labels.averaging import trust_in
 from rcsa_ident.stability.labels.cut_margins import CutMargins, DrawnMargins, points_of
 from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, LabelPosterior, learn_labels
@@ -148,9 +148,8 @@ class Pool:
         physics = self.stable(found.posterior, model, some).mean(axis=0)
         if found.without is None:
             return np.asarray(physics)
-        without, near = found.without.told(found.without.features_of(self.cuts.at_places(some), PROCESS))
-        weight = weight_of_labels(near, found.trust)
-        return np.asarray((1.0 - weight) * physics + weight * without)
+        without, _ = found.without.told(found.without.features_of(self.cuts.at_places(some), PROCESS))
+        return np.asarray(found.trust * physics + (1.0 - found.trust) * without)
 
 
 @dataclass(frozen=True, eq=False)

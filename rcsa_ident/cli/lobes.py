@@ -222,7 +222,7 @@ def tell_lobes(
             answers = tested_answers(change, cuts)
             write_tests(tests_out, cuts, answers)
         if isinstance(change.machine, LearntTip):
-            remarks += uncovered(change.machine.cuts, cuts, change.process, answers.covered)
+            remarks += uncovered(change.machine.posterior.points, cuts, change.process, answers.covered)
     if plot is not None:
         from rcsa_ident.report.lobes import Judged, save_figure, stability_figure
 

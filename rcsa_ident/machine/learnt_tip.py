@@ -15,7 +15,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.setup.cut import Workpiece
 from rcsa_ident.setup.tooling import Tooling
-from rcsa_ident.stability.labels.averaging import trust_in, weight_of_labels
+from rcsa_ident.stability.labels.averaging import belief_in, trust_in
 from rcsa_ident.stability.labels.coverage import Covered, TestedAnswers, covered
 from rcsa_ident.stability.labels.cut_margins import CutMargins, points_of
 from rcsa_ident.stability.labels.label_posterior import FEWEST, LabelModel, LabelPosterior
@@ -147,7 +147,8 @@ class LearntTip(TipSource):
     def answers(self, process: MillingProcess, cuts: TestedCuts) -> TestedAnswers:
         """Return what is believed of cuts: by physics and by the labels alone, and whether labels cover them.
 
-        Where labels end it is that of physics, and in a direction that has none what was believed before the first label.
+        In a direction that has no label it is what was believed before the first one, as far as that told the labels that came, and else
+        an even chance.
 
         `process`: of what a cut does not tell of itself
         """
@@ -155,10 +156,10 @@ class LearntTip(TipSource):
         if self.process is None:
             return TestedAnswers(found, (Covered.NO,) * found.size)
         without, near = self.process.told(self.process.features_of(cuts, process))
-        weight = weight_of_labels(near, self.trust)
-        found = (1.0 - weight) * found + weight * without
-        cover = covered(self.cuts, cuts, process, near)
-        outside = ~np.isin(points_of(cuts, process)[:, 2], self.posterior.points[:, 2])
+        found = self.trust * found + (1.0 - self.trust) * without
+        points, edges = self.posterior.points, frozenset(own.edge_state for own in self.cuts.own)
+        cover = covered(points, edges, cuts, process, near)
+        outside = ~np.isin(points_of(cuts, process)[:, 2], points[:, 2])
         if outside.any():
             found[outside] = self._before(process, cuts.at_places(np.flatnonzero(outside)))
         return TestedAnswers(found, cover)
@@ -172,7 +173,8 @@ class LearntTip(TipSource):
         z = np.random.default_rng(_SEED).standard_normal((_BEFORE, self.prior.size))
         margin = CutMargins(self.prior, process, self.method, cuts)(z).margin
         error = self.model.discrepancy.deviation * np.random.default_rng(_SEED).standard_normal(margin.shape)
-        found: FloatArray = self.model.noise.stable(margin + error).mean(axis=0)
+        belief = belief_in(self.posterior.log_score_before, int(np.sum(self.cuts.counts)))
+        found: FloatArray = 0.5 + belief * (self.model.noise.stable(margin + error).mean(axis=0) - 0.5)
         return found
 
     def __str__(self) -> str:

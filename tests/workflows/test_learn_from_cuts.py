@@ -10,9 +10,11 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.setup.cut import CutSpec
 from rcsa_ident.setup.tooling import BareCutter
+from rcsa_ident.stability.labels.averaging import belief_in
+from rcsa_ident.stability.labels.coverage import Covered
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel
 from rcsa_ident.stability.labels.next_test import most_telling
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.learn_from_cuts import Believed, learn_from_cuts, next_tests
@@ -78,3 +80,24 @@ def test_next_tests_are_those_whose_labels_tell_most():
     assert {round(1e3 * f.axial_depth, 2) for f in found} == {0.5, 0.7}
     free = next_tests(learnt, process, 3, None, from_rpm(np.arange(8000.0, 9001.0, 500.0)), 3e-3)
     assert all(0.1 < f.probability_stable < 0.9 for f in free)
+
+
+def test_answers_are_averages_where_labels_are_and_beliefs_where_there_are_none():
+    """Cuts milled up are labelled: a cut milled down has the probability of before the first label, whatever was learnt."""
+    up, down = OwnConditions(strategy="up"), OwnConditions(strategy="down")
+    labels = TestedCuts(CUTS.spindle_speed, CUTS.axial_depth, CUTS.verdict, own=(up, up))
+    learnt = learn_from_cuts(believed(), TOOLING, CUT, labels, ZeroOrder(), effort=EFFORT)
+    process = CUT.process(TOOLING.cutter, learnt.workpiece)
+    depth = np.array([0.9e-3, 0.9e-3])
+    asked = TestedCuts(CUTS.spindle_speed, depth, (Verdict.MARGINAL,) * 2, own=(up, down))
+    found = learnt.answers(process, asked)
+    assert found.covered == (Covered.YES, Covered.NO)
+    physics = learnt.stable_by_draw(process, asked).mean(axis=0)[0]
+    without = learnt.process.told(learnt.process.features_of(asked, process))[0][0]
+    weight = 1.0 - learnt.trust
+    assert found.stable[0] == pytest.approx((1.0 - weight) * physics + weight * without)
+    belief = belief_in(learnt.posterior.log_score_before, 2)
+    fresh = learn_from_cuts(believed(), TOOLING, CUT, TestedCuts.none(), ZeroOrder(), effort=Effort(10, 0, 0, 2000))
+    assert found.stable[1] == pytest.approx(0.5 + belief * (fresh.answers(process, asked).stable[1] - 0.5), abs=0.05)
+    assert 0.1 < belief < 0.9
+    assert 0.0 < learnt.trust < 1.0 == fresh.trust

@@ -90,6 +90,7 @@ def learnt_tip_to_json(learnt: LearntTip) -> dict[str, Any]:
         "posterior": {
             "effective_draws": found.effective,
             "log_evidence": found.log_evidence,
+            "log_score_before": found.log_score_before,
             "points": (found.points * _PER_POINT).tolist(),
             "draws": _rounded(found.z),
             "errors": _rounded(found.error),
@@ -183,7 +184,9 @@ def learnt_tip_of(data: Any, where: str) -> LearntTip:
     points = (_matrix(found, "points", 3) if top.data.get("cuts") else np.zeros((0, 3))) / _PER_POINT
     errors = _matrix(found, "errors", len(points)) if len(points) else np.zeros((len(z), 0))
     with found.naming({}):
-        posterior = LabelPosterior(z, points, errors, found.number("log_evidence"), found.number("effective_draws", above=0.0))
+        posterior = LabelPosterior(
+            z, points, errors, found.number("log_evidence"), found.number("effective_draws", above=0.0), found.number("log_score_before")
+        )
     method = METHODS[top.text("method", choices=tuple(METHODS))]()
     return LearntTip(prior, workpiece.coefficients, method, model, _cuts(top), posterior, _process_of(top))
 

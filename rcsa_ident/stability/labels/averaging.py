@@ -1,12 +1,9 @@
-"""Physics beside labels without physics: how much each counts."""
+"""How much physics counts: beside labels without physics, and where there are no labels."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.special import expit
-
-from rcsa_ident.base.arrays import FloatArray
-from rcsa_ident.stability.labels.coverage import COVERED, PARTLY
 
 #: Odds of physics before the first cut, and cuts that count for one: those of a session are alike.
 _BEFORE, _ALIKE = 4.0, 2.0
@@ -26,13 +23,15 @@ def trust_in(evidence: float) -> float:
     return float(expit(np.log(_BEFORE) + evidence / _ALIKE))
 
 
-def weight_of_labels(near: FloatArray, trust: float) -> FloatArray:
-    """Return the weight of labels without physics, shape (n,): 1 - trust near a label, its square where labels end.
+def belief_in(log_score: float, labels: int) -> float:
+    """Return the weight of what was believed before labels beside an even chance, where no label tells anything.
 
-    There physics goes on, unless cuts that it had not seen refuted it.
+    `log_score`: mean logarithm of the probability that it gave each verdict
+    `labels`: how many
 
-    `trust`: weight of physics near labels
+    Examples
+    --------
+    >>> [round(belief_in(each, 20), 3) for each in (-0.4, -0.7, -2.0)]
+    [0.949, 0.483, 0.0]
     """
-    inside = np.clip((near - PARTLY) / (COVERED - PARTLY), 0.0, 1.0)
-    found: FloatArray = (1.0 - trust) * (1.0 - trust * (1.0 - inside))
-    return found
+    return float(expit(labels * (log_score + np.log(2.0)) / _ALIKE))

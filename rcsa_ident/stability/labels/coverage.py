@@ -16,7 +16,7 @@ from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
 #: Ratio of widths up to which labels of one width tell of another.
 _WIDER = 1.6
 #: How near the nearest label is to a cut that is covered, one length of the process away, and to one that is partly so, two lengths.
-COVERED, PARTLY = np.exp(-0.5), np.exp(-2.0)
+_COVERED, _PARTLY = np.exp(-0.5), np.exp(-2.0)
 
 
 class Covered(StrEnum):
@@ -41,18 +41,18 @@ class TestedAnswers:
     covered: tuple[Covered, ...]
 
 
-def covered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, near: FloatArray) -> tuple[Covered, ...]:
+def covered(points: FloatArray, edges: frozenset[str], asked: TestedCuts, process: MillingProcess, near: FloatArray) -> tuple[Covered, ...]:
     """Return whether labels cover each cut: never in a direction that has none, and partly at most with edges that have none.
 
-    `near`, shape (n,): how near the nearest label is, as of `LabelProcess.told`
+    `points`, shape (n, 3): speeds, immersions and directions of the labels, as of `points_of`
+    `edges`: states of the edges that labels have
+    `near`, shape (m,): how near the nearest label is, as of `LabelProcess.told`
     """
-    directions = set(points_of(labels, process)[:, 2].tolist())
-    edges = {own.edge_state for own in labels.own}
     found = []
     for share, up, own in zip(near, points_of(asked, process)[:, 2], asked.own, strict=True):
-        if up not in directions or share < PARTLY:
+        if up not in points[:, 2] or share < _PARTLY:
             found.append(Covered.NO)
-        elif share < COVERED or own.edge_state not in edges:
+        elif share < _COVERED or own.edge_state not in edges:
             found.append(Covered.PARTLY)
         else:
             found.append(Covered.YES)
@@ -81,18 +81,16 @@ def unlabelled(points: FloatArray, process: MillingProcess) -> tuple[str, ...]:
     return tuple(said)
 
 
-def uncovered(labels: TestedCuts, asked: TestedCuts, process: MillingProcess, cover: tuple[Covered, ...]) -> tuple[str, ...]:
-    """Return in words which cuts labels do not cover, and why."""
-    said = []
-    there, wanted = points_of(labels, process), points_of(asked, process)
+def uncovered(points: FloatArray, asked: TestedCuts, process: MillingProcess, cover: tuple[Covered, ...]) -> tuple[str, ...]:
+    """Return in words which cuts labels do not cover, and why; `points` as of `covered`."""
+    said, wanted = [], points_of(asked, process)[:, 2]
     for up, name in ((1.0, "up"), (0.0, "down")):
-        count = int(np.sum(wanted[:, 2] == up))
-        if count and up not in there[:, 2]:
+        count = int(np.sum(wanted == up))
+        if count and up not in points[:, 2]:
             of = counted(count, "cut")
             said.append(f"no label was ever taken in {name} milling: of {of} the probability is what was believed before any label")
-    told = np.array([each is Covered.NO for each in cover]) & np.isin(wanted[:, 2], there[:, 2])
+    told = np.array([each is Covered.NO for each in cover]) & np.isin(wanted, points[:, 2])
     if told.any():
-        are = "is" if told.sum() == 1 else "are"
-        far = counted(int(told.sum()), "cut")
+        are, far = "is" if told.sum() == 1 else "are", counted(int(told.sum()), "cut")
         said.append(f"{far} {are} far from every label: the probability is that of the learnt tip alone")
     return tuple(said)

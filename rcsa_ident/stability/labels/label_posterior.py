@@ -54,6 +54,7 @@ class LabelPosterior:
     `points`, shape (n, 3): tested speeds [rad/s], immersions and directions, as `LimitDiscrepancy` takes them; none before the first label
     `error`, shape (r, n): of the logarithm of the limit, at these points
     `log_evidence`: logarithm of the probability of all labels before they were seen
+    `log_score_before`: mean logarithm of the probability that each verdict had before any was seen
     `effective`: draws with equal weights that would tell as much as the weighted ones that these were chosen from
     """
 
@@ -62,6 +63,7 @@ class LabelPosterior:
     error: FloatArray
     log_evidence: float
     effective: float
+    log_score_before: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("z", "points", "error"):
@@ -130,8 +132,10 @@ def learn_labels(
     share = np.exp(own - logsumexp(own, axis=1, keepdims=True))
     first = np.array([rng.choice(_ERRORS, p=each / each.sum()) for each in share])
     moved = elliptical_slices(number[first], lambda u: joint.of_each(drawn, u @ root.T), rng, _MOVES)
+    # the first round is drawn from the prior: what it says of each cut by itself
+    before = joint.alone(known[0].margin, number @ root.T)
     order = rng.permutation(effort.kept)
-    return LabelPosterior(found.z[chosen][order], where, (moved @ root.T)[order], found.log_evidence, found.effective)
+    return LabelPosterior(found.z[chosen][order], where, (moved @ root.T)[order], found.log_evidence, found.effective, before)
 
 
 def _even_normals(size: int, rng: np.random.Generator) -> FloatArray:
@@ -165,6 +169,15 @@ class _Joint:
             margin = tips.margin[:, k, None] + error[:, at]
             found += self.noise.log_likelihood(self.cuts.at_places(np.array([k])), margin[..., None])
         return found + self.noise.heard(self.cuts, tips.chatter)[:, None]
+
+    def alone(self, margin: FloatArray, error: FloatArray) -> float:
+        """Mean log probability of each verdict by itself, by tips of shape (d, n) with one error each."""
+        with_error = margin + np.resize(error, (len(margin), error.shape[1]))[:, self.place]
+        each = [
+            logsumexp(self.noise.log_likelihood(self.cuts.at_places(np.array([k])), with_error[:, k, None])) - np.log(len(margin))
+            for k in range(len(self.place))
+        ]
+        return float(np.sum(each) / np.sum(self.cuts.counts))
 
     def of_each(self, tips: DrawnMargins, error: FloatArray) -> FloatArray:
         """Of each tip with its own error, shapes (d, n), (d, p) -> (d,)."""

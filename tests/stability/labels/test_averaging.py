@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.stability.labels.averaging import trust_in, weight_of_labels
+from rcsa_ident.stability.labels.averaging import belief_in, trust_in
 
 
 def test_the_weight_is_that_of_the_evidence():
@@ -15,8 +15,7 @@ def test_the_weight_is_that_of_the_evidence():
     assert trust_in(-100.0) < 1e-9
 
 
-def test_labels_keep_their_weight_where_they_are():
-    near = np.array([1.0, np.exp(-0.5), np.exp(-2.0), 0.0])
-    assert weight_of_labels(near, 0.0).tolist() == [1.0] * 4
-    assert weight_of_labels(near, 1.0).tolist() == [0.0] * 4
-    assert weight_of_labels(near, 0.8) == pytest.approx([0.2, 0.2, 0.04, 0.04])
+def test_a_belief_that_told_labels_no_better_than_a_coin_is_an_even_chance():
+    assert belief_in(np.log(0.5), 10) == pytest.approx(0.5)
+    assert belief_in(np.log(0.5) + 0.1, 20) == pytest.approx(np.e / (1.0 + np.e))
+    assert belief_in(-3.0, 40) < 1e-9

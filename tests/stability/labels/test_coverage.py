@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.stability.labels.coverage import Covered, covered, uncovered, unlabelled
+from rcsa_ident.stability.labels.cut_margins import points_of
 from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
 from tests.stability.labels.test_tested_cuts import CUT
 
@@ -15,14 +16,15 @@ def cuts(*told):
 
 
 def test_direction_edges_and_distance():
-    labels, asked = cuts(("up", "new")), cuts(("up", "new"), ("up", "new"), ("up", "new"), ("up", "worn"), ("down", "new"))
-    found = covered(labels, asked, CUT, np.array([0.9, 0.4, 0.1, 0.9, 0.9]))
+    asked = cuts(("up", "new"), ("up", "new"), ("up", "new"), ("up", "worn"), ("down", "new"))
+    labels = points_of(cuts(("up", "new")), CUT)
+    found = covered(labels, frozenset({"new"}), asked, CUT, np.array([0.9, 0.4, 0.1, 0.9, 0.9]))
     assert found == (Covered.YES, Covered.PARTLY, Covered.NO, Covered.PARTLY, Covered.NO)
     assert uncovered(labels, asked, CUT, found) == (
         "no label was ever taken in down milling: of 1 cut the probability is what was believed before any label",
         "1 cut is far from every label: the probability is that of the learnt tip alone",
     )
-    assert uncovered(labels, labels, CUT, (Covered.YES,)) == ()
+    assert uncovered(labels, cuts(("up", "new")), CUT, (Covered.YES,)) == ()
 
 
 def test_a_question_that_differs_from_all_labels():
