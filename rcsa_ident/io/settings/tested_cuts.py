@@ -10,7 +10,7 @@ import numpy as np
 
 from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.errors import InputError
-from rcsa_ident.base.units import from_hz, from_rpm, to_rpm
+from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.io.validated_table import listed
@@ -45,7 +45,7 @@ def read_candidates(path: str | Path) -> TestedCuts:
     """Return cuts that may be tested: the first two of `COLUMNS`; verdicts, where there are any, are not looked at."""
     table = read_table(path, "cuts to choose from")
     speed, depth = _conditions(table, COLUMNS[:2])
-    return TestedCuts(from_rpm(speed), depth * 1e-3, (Verdict.MARGINAL,) * speed.size, None, _own(table))
+    return TestedCuts(from_rpm(speed), depth * 1e-3, (Verdict.MARGINAL,) * speed.size, own=_own(table))
 
 
 def tested_cuts_of(text: str, where: str) -> TestedCuts:
@@ -147,14 +147,19 @@ def _chatter(table: TextTable) -> FloatArray:
 
 
 def write_tests(path: str | Path, cuts: TestedCuts, answers: TestedAnswers) -> None:
-    """Write TESTS.csv: each tested cut with the probability that it is stable, and whether labels cover it."""
-    shown = own_columns(cuts)
-    rows = zip(to_rpm(cuts.spindle_speed), 1e3 * cuts.axial_depth, cuts.verdict, cuts.own, answers.stable, answers.covered, strict=True)
-    lines = [
-        ",".join([f"{speed:.10g}", f"{depth:.10g}", verdict, *(told(own, column) for column in shown), f"{p:.6g}", cover])
-        for speed, depth, verdict, own, p, cover in rows
-    ]
-    write_text(path, "\n".join([",".join((*COLUMNS, *shown, "probability_stable", "covered")), *lines, ""]))
+    """Write TESTS.csv: each tested cut with all that is read of it, the probability that it is stable, and whether labels cover it."""
+    columns = {
+        COLUMNS[0]: [f"{speed:.10g}" for speed in to_rpm(cuts.spindle_speed)],
+        COLUMNS[1]: [f"{depth:.10g}" for depth in 1e3 * cuts.axial_depth],
+        COLUMNS[2]: [str(each) for each in cuts.verdict],
+    }
+    if np.isfinite(cuts.chatter_frequency).any():
+        columns[CHATTER] = ["" if np.isnan(each) else f"{each:.10g}" for each in to_hz(cuts.chatter_frequency)]
+    # a session named with a comma, in a table that had semicolons, is no two cells
+    columns |= {column: [told(own, column).replace(",", ";") for own in cuts.own] for column in own_columns(cuts)}
+    columns["probability_stable"] = [f"{p:.6g}" for p in answers.stable]
+    columns["covered"] = [str(each) for each in answers.covered]
+    write_text(path, "\n".join([",".join(columns), *map(",".join, zip(*columns.values(), strict=True)), ""]))
 
 
 def own_columns(cuts: TestedCuts) -> list[str]:
