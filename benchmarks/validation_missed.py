@@ -11,7 +11,7 @@ from benchmarks import compensation, real_machine
 from benchmarks.removal import BALL, beside, cuts, leaning_turns
 from benchmarks.robot_milling import ALUMINIUM, LENGTH, POSTURE, PUBLISHED, SIDES, feed
 from benchmarks.validation_case import Case, Measure
-from benchmarks.validation_files import CUTS, FILES, HAMMER, calibrated
+from benchmarks.validation_files import FILES, HAMMER, calibrated
 from benchmarks.validation_stability import peak, robot_row
 from benchmarks.validation_study import MISSED
 from rcsa_ident.front.samples import sample_robot
@@ -184,7 +184,6 @@ WORDS = (
     "**Joints of a KUKA KR300** (traj_A.mat, traj_B.mat, github.com/JonasWeigand/Robot_Identification): motion B is explained to 0.98 and "
     "better by the fit of A, but its springs come out 1.7, 1.3 and 1.2 times those of the files' own parameters, those of A 1.05 and 1.3 "
     "times on axes 2 and 3, and A does not tell axis 1 ([robots.md](robots.md)). The arm's file is not shipped: no command repeats it.",
-    f"**Labels chosen one after the other** ({CUTS}): 89.8 % after 40 where 90 % was asked for ([labelled_cuts.md](labelled_cuts.md)).",
     "**The published learning of the labelled cuts** is told by its authors as 83.1 and 79.7 %: ours is another method on the same cuts, "
     "which tells a few more of them right. That is no reproduction of theirs.",
     "**Coefficients of materials** without a printed table (marked *typical* by `rcsa-ident materials`) are fits of handbook laws.",
