@@ -111,7 +111,8 @@ def test_labels_move_probabilities_their_way(shop, learnt):
     stable = [p > 0.5 for p in list(after.values())[:4]] + [p > 0.5 for p in list(after.values())[5:]]
     seen = [True, False, True, True, True, False]
     assert found["tested"]["share_right"] == pytest.approx(np.mean(np.equal(stable, seen)))
-    assert after[8000, 0.05] == pytest.approx(0.98, abs=0.01)
+    # physics has no doubt here; four labels by themselves, a tenth of the weight, have
+    assert 0.94 < after[8000, 0.05] < 0.98
     # a pocket of a few draws lies here
     assert 0.02 <= after[8000, 9.0] < 0.1
     assert after[11000, 1.6] > 0.5
