@@ -113,8 +113,8 @@ def test_labels_move_probabilities_their_way(shop, learnt):
     assert found["tested"]["share_right"] == pytest.approx(np.mean(np.equal(stable, seen)))
     # physics has no doubt here; four labels by themselves, a tenth of the weight, have
     assert 0.94 < after[8000, 0.05] < 0.98
-    # a pocket of a few draws lies here
-    assert 0.02 <= after[8000, 9.0] < 0.1
+    # a pocket of a few draws lies here, and the same doubt
+    assert 0.02 <= after[8000, 9.0] < 0.12
     assert after[11000, 1.6] > 0.5
     assert after[8000, 0.9] < plain[8000, 0.9]
     assert after[11000, 0.9] > after[11000, 1.6] > after[11000, 2.5]
