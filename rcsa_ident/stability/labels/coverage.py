@@ -88,7 +88,9 @@ def uncovered(points: FloatArray, asked: TestedCuts, process: MillingProcess, co
         count = int(np.sum(wanted == up))
         if count and up not in points[:, 2]:
             of = counted(count, "cut")
-            said.append(f"no label was ever taken in {name} milling: of {of} the probability is what was believed before any label")
+            said.append(
+                f"no label was ever taken in {name} milling: the probability of {of} is what was believed before, or an even chance"
+            )
     told = np.array([each is Covered.NO for each in cover]) & np.isin(wanted, points[:, 2])
     if told.any():
         are, far = "is" if told.sum() == 1 else "are", counted(int(told.sum()), "cut")

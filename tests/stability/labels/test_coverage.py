@@ -21,7 +21,7 @@ def test_direction_edges_and_distance():
     found = covered(labels, frozenset({"new"}), asked, CUT, np.array([0.9, 0.4, 0.1, 0.9, 0.9]))
     assert found == (Covered.YES, Covered.PARTLY, Covered.NO, Covered.PARTLY, Covered.NO)
     assert uncovered(labels, asked, CUT, found) == (
-        "no label was ever taken in down milling: of 1 cut the probability is what was believed before any label",
+        "no label was ever taken in down milling: the probability of 1 cut is what was believed before, or an even chance",
         "1 cut is far from every label: the probability is that of the learnt tip alone",
     )
     assert uncovered(labels, cuts(("up", "new")), CUT, (Covered.YES,)) == ()
