@@ -37,8 +37,8 @@ from rcsa_ident.workflows.learn_from_cuts import Believed, learn_from_cuts
 CUTS = FILES / "labelled_cuts_hurco" / "labels.csv"
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "labelled_cuts_votes.md"
 INCH = 25.4e-3
-#: Half an inch, five teeth; the helix is not told, nor is a modal test: means and their shares of a vague prior, written down before any
-#: cut was asked about.
+#: Half an inch, five teeth; the helix is not told, nor is a modal test: means and their shares of a vague prior, written down before
+#: physics was first asked about these cuts; their verdicts had been seen.
 TOOLING = BareCutter("half inch", Cutter(5, 0.5 * INCH, np.radians(38.0)))
 FREQUENCY, DAMPING, STIFFNESS, SHARES = from_hz(1500.0), 0.03, 8e6, (0.4, 0.5, 0.6)
 COEFFICIENTS = CuttingCoefficients(2.1e9, 1.0 / 3.0, tangential_spread=0.2, ratio_spread=0.3)
@@ -207,7 +207,8 @@ diameter wide, up and down, at seven speeds, judged by two experts as stable, be
 No modal test is known: the tip is believed to have one mode in each direction, 1500 Hz ± 40 %, damping ratio 0.03 ± 50 %,
 8 N/µm ± 60 %; K_tc 2100 MPa ± 20 %. Scores are over the {clear} cuts on which the experts are clear: the sum of both verdicts (0, 1, 2) is
 at most 1, or at least 3. Each group is told by all cuts of the others. Log scores are means of the natural logarithm of the probability of
-what was seen; the calibration error is the mean difference between probability and share in ten bins.
+what was seen; the calibration error is the mean difference between probability and share in ten bins. The priors of the process without
+physics were written down after some twenty prototypes had been scored on these cuts: its rows are no blind test.
 
 {text}
 

@@ -79,11 +79,8 @@ async def tested_cuts(request: Request) -> TestedCutsAnswer:
         columns = ([float(f"{value:.12g}") for value in values] for values in (to_rpm(found.spindle_speed), 1e3 * found.axial_depth))
         cuts = [tested_cut(*row) for row in enumerate(zip(*columns, found.verdict, strict=True))]
         own = own_columns(found)
-        told = (
-            [f"{', '.join(own)}: left aside here, where every cut is asked with the width, direction and feed of the question"]
-            if own
-            else []
-        )
-        return TestedCutsAnswer(cuts=cuts, warnings=[*warnings, *told])
+        if own:
+            warnings.append(f"{', '.join(own)}: not used here; every cut is evaluated with the width, direction and feed of the question")
+        return TestedCutsAnswer(cuts=cuts, warnings=warnings)
 
     return await run_in_threadpool(read)

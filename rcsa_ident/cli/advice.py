@@ -190,7 +190,7 @@ def _name_tests(
 ) -> None:
     """Tell which cuts to test next."""
     from rcsa_ident.cli.learn import believed_of
-    from rcsa_ident.io.settings.tested_cuts import read_candidates
+    from rcsa_ident.io.settings.tested_cuts import OWN, cell_of, read_candidates
     from rcsa_ident.stability.labels.tested_cuts import TestedCuts
     from rcsa_ident.stability.lobes import METHODS
     from rcsa_ident.workflows.learn_from_cuts import learn_from_cuts, next_tests
@@ -213,6 +213,7 @@ def _name_tests(
                 "axial_depth_mm": round(1e3 * each.axial_depth, 9),
                 "probability_stable": each.probability_stable,
             }
+            | {column: cell for column in OWN if (cell := cell_of(each.own, column))}
             for each in found
         ]
         emit({"next_tests": rows, "warnings": remarks, "seconds": stages.seconds})

@@ -15,6 +15,7 @@ from rcsa_ident.base.arrays import FloatArray
 from rcsa_ident.base.units import to_cm3_per_min, to_hz, to_rpm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
+from rcsa_ident.io.settings.tested_cuts import OWN, cell_of
 from rcsa_ident.machine.workpiece_side import WorkpieceSide
 from rcsa_ident.report.summaries import (
     DrawingRow,
@@ -249,9 +250,11 @@ def show_believed(rows: Mapping[str, Any]) -> None:
 
 def show_next_tests(tests: Sequence[NextTest]) -> None:
     """Print the cuts whose labels tell most, the most telling first."""
-    table = _table("rev/min", "depth mm", "stable with\nprobability", title="next tests, the most telling first")
+    columns = [column for column in OWN if any(cell_of(test.own, column) for test in tests)]
+    table = _table("rev/min", "depth mm", "stable with\nprobability", *columns, title="next tests, the most telling first")
     for test in tests:
-        table.add_row(f"{to_rpm(test.spindle_speed):.0f}", f"{1e3 * test.axial_depth:.3g}", f"{test.probability_stable:.2f}")
+        cells = f"{to_rpm(test.spindle_speed):.0f}", f"{1e3 * test.axial_depth:.3g}", f"{test.probability_stable:.2f}"
+        table.add_row(*cells, *(escape(cell_of(test.own, column)) for column in columns))
     show(table)
 
 

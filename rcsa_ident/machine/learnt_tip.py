@@ -34,8 +34,8 @@ THIN = "only {:.0f} of the draws agree with the labels, fewer than {:.0f}: proba
 
 #: What is said where the labels alone are the better explanation, by so much of the log evidence.
 WORSE = (
-    "a smooth process without physics explains the labels better (log evidence {:.0f}, physics {:.0f}): limits of this tip are not to be "
-    "trusted away from the labels"
+    "a process without physics explains the labels better (log evidence {:.0f}, physics {:.0f}): limits of this tip are not reliable away "
+    "from the labels"
 )
 _BETTER = 10.0
 
@@ -163,10 +163,6 @@ class LearntTip(TipSource):
         if outside.any():
             found[outside] = self._before(process, cuts.at_places(np.flatnonzero(outside)))
         return TestedAnswers(found, cover)
-
-    def probabilities(self, process: MillingProcess, cuts: TestedCuts) -> FloatArray:
-        """Return the probability that each cut is called stable, shape (n,)."""
-        return self.answers(process, cuts).stable
 
     def _before(self, process: MillingProcess, cuts: TestedCuts) -> FloatArray:
         """The same before the first label."""

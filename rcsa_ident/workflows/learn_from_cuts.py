@@ -21,7 +21,7 @@ from rcsa_ident.stability.labels.cut_margins import CutMargins, DrawnMargins
 from rcsa_ident.stability.labels.label_posterior import Effort, LabelModel, learn_labels
 from rcsa_ident.stability.labels.label_process import LabelProcess
 from rcsa_ident.stability.labels.next_test import most_telling
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.lobes import both_directions
 from rcsa_ident.stability.methods import StabilityMethod
@@ -143,11 +143,13 @@ class NextTest:
 
     `spindle_speed` [rad/s]; `axial_depth` [m]
     `probability_stable` [-]: as it is believed now
+    `own`: its other conditions, where a table of candidates has them
     """
 
     spindle_speed: float
     axial_depth: float
     probability_stable: float
+    own: OwnConditions = OwnConditions()  # noqa: RUF009 - frozen
 
 
 def next_tests(
@@ -165,4 +167,6 @@ def next_tests(
         among = TestedCuts(grid[0].ravel(), grid[1].ravel(), (Verdict.MARGINAL,) * grid[0].size)
     each = learnt.stable_by_draw(process, among)
     chosen = most_telling(each, count, np.random.default_rng(seed))
-    return [NextTest(float(among.spindle_speed[k]), float(among.axial_depth[k]), float(each[:, k].mean())) for k in chosen]
+    asked = among.at_places(np.array(chosen, dtype=np.intp))
+    rows = zip(asked.spindle_speed, asked.axial_depth, learnt.answers(process, asked).stable, asked.own, strict=True)
+    return [NextTest(float(speed), float(depth), float(stable), own) for speed, depth, stable, own in rows]

@@ -81,7 +81,7 @@ def test_tested_cuts_are_read_as_the_commands_read_them(client):
     ]
     own = plain.replace("\n", ",up\n").replace("verdict,up", "verdict,strategy")
     assert client.tested_cuts(own).warnings == [
-        "strategy: left aside here, where every cut is asked with the width, direction and feed of the question"
+        "strategy: not used here; every cut is evaluated with the width, direction and feed of the question"
     ]
     assert refused(422, client.tested_cuts, plain.replace("8000", "5")).errors[0].field == "cuts[0].spindle_speed_rpm"
     assert "verdict" in refused(422, client.tested_cuts, plain.replace("Chatter", "loud")).errors[0].field

@@ -53,7 +53,7 @@ def test_the_median_of_the_draws_is_the_limit():
     assert np.all((lobes.limit_depth >= ranked[24]) & (lobes.limit_depth <= ranked[25]))
     # a cut as deep as the median is as likely stable as not, but for the boundary's own width
     here = TestedCuts(speeds[:1], lobes.limit_depth[:1], (Verdict.MARGINAL,))
-    assert learnt.probabilities(process, here)[0] == pytest.approx(0.5, abs=0.1)
+    assert learnt.answers(process, here).stable[0] == pytest.approx(0.5, abs=0.1)
 
 
 def test_coefficients_of_another_material_keep_what_the_labels_taught():
@@ -78,6 +78,14 @@ def test_next_tests_are_those_whose_labels_tell_most():
     expected = most_telling(learnt.stable_by_draw(process, among), 2, np.random.default_rng(1))
     assert [f.axial_depth for f in found] == [among.axial_depth[k] for k in expected]
     assert {round(1e3 * f.axial_depth, 2) for f in found} == {0.5, 0.7}
+    # candidates keep their conditions, and have the probability that `lobes --tests` gives
+    taught = learn_from_cuts(believed(), TOOLING, CUT, CUTS, ZeroOrder(), effort=EFFORT)
+    own = tuple(OwnConditions(radial_immersion=share) for share in (0.1, 0.5, 0.9, 0.2))
+    other = TestedCuts(among.spindle_speed, among.axial_depth, among.verdict, own=own)
+    one = next_tests(taught, process, 1, other, speed, 1e-3)[0]
+    place = own.index(one.own)
+    assert one.axial_depth == other.axial_depth[place]
+    assert one.probability_stable == pytest.approx(taught.answers(process, other).stable[place])
     free = next_tests(learnt, process, 3, None, from_rpm(np.arange(8000.0, 9001.0, 500.0)), 3e-3)
     assert all(0.1 < f.probability_stable < 0.9 for f in free)
 

@@ -13,7 +13,7 @@ from rcsa_ident.base.arrays import ComplexArray, FloatArray
 from rcsa_ident.base.units import from_hz, from_rpm, to_hz, to_rpm
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.results.parts import layout, plain, read_json
-from rcsa_ident.io.settings.tested_cuts import OWN, own_conditions, told
+from rcsa_ident.io.settings.tested_cuts import OWN, cell_of, own_conditions
 from rcsa_ident.io.settings.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machine.learnt_tip import LearntTip
@@ -21,7 +21,7 @@ from rcsa_ident.stability.labels.label_noise import LabelNoise
 from rcsa_ident.stability.labels.label_posterior import LabelModel, LabelPosterior
 from rcsa_ident.stability.labels.label_process import CutFeatures, LabelProcess
 from rcsa_ident.stability.labels.limit_discrepancy import LimitDiscrepancy
-from rcsa_ident.stability.labels.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.labels.tested_cuts import OwnConditions, TestedCuts, Verdict
 from rcsa_ident.stability.labels.uncertain_tip import UncertainTip
 from rcsa_ident.stability.lobes import METHODS
 from rcsa_ident.stability.tip_modes import TipModes
@@ -82,7 +82,7 @@ def learnt_tip_to_json(learnt: LearntTip) -> dict[str, Any]:
         "cuts": [
             {"spindle_speed_rpm": to_rpm(float(speed), 6), "axial_depth_mm": round(1e3 * float(depth), 9), "verdict": str(verdict)}
             | ({} if np.isnan(chatter) else {"chatter_frequency_hz": to_hz(float(chatter))})
-            | {name: cell for name in OWN if (cell := told(own, name))}
+            | {name: cell for name in OWN if (cell := cell_of(own, name))}
             for speed, depth, verdict, chatter, own in zip(
                 cuts.spindle_speed, cuts.axial_depth, cuts.verdict, cuts.chatter_frequency, cuts.own, strict=True
             )
@@ -125,12 +125,10 @@ def _process_of(top: Table) -> LabelProcess | None:
     table = top.table("without_physics")
     numbers, kinds, counts, drawn = (_matrix(table, key, n) for key, n in (("numbers", 4), ("kinds", 2), ("counts", 3), ("draws", None)))
     session = np.array(table.numbers("session", None))
-    for key, size in (("kinds", len(kinds)), ("counts", len(counts)), ("session", session.size)):
-        if size != len(numbers):
-            table.refuse(key, f"{size} rows", f"as many as numbers: {len(numbers)}")
     names = tuple(str(each) for each in table.value("sessions", "a list of names"))
     features = CutFeatures(numbers, kinds, session)
-    return LabelProcess(features, np.array(table.numbers("middle", 4)), names, counts, drawn, table.number("log_evidence"))
+    with table.naming({}):
+        return LabelProcess(features, np.array(table.numbers("middle", 4)), names, counts, drawn, table.number("log_evidence"))
 
 
 def believed(learnt: LearntTip) -> dict[str, Any]:
@@ -198,8 +196,13 @@ def _cuts(top: Table) -> TestedCuts:
         1e-3 * np.array([row.number("axial_depth_mm", "mm", above=0.0) for row in rows]),
         tuple(Verdict(row.text("verdict", choices=tuple(Verdict))) for row in rows),
         from_hz(np.array([row.number("chatter_frequency_hz", "Hz", np.nan, above=0.0) for row in rows])),
-        tuple(own_conditions({name: str(row.data[name]) for name in OWN if name in row.data}) for row in rows),
+        tuple(_own(row) for row in rows),
     )
+
+
+def _own(row: Table) -> OwnConditions:
+    with row.naming({}):
+        return own_conditions({name: str(row.data[name]) for name in OWN if name in row.data})
 
 
 def _parts(model: LabelModel) -> Sequence[tuple[str, LabelNoise | LimitDiscrepancy]]:

@@ -156,7 +156,7 @@ def write_tests(path: str | Path, cuts: TestedCuts, answers: TestedAnswers) -> N
     if np.isfinite(cuts.chatter_frequency).any():
         columns[CHATTER] = ["" if np.isnan(each) else f"{each:.10g}" for each in to_hz(cuts.chatter_frequency)]
     # a session named with a comma, in a table that had semicolons, is no two cells
-    columns |= {column: [told(own, column).replace(",", ";") for own in cuts.own] for column in own_columns(cuts)}
+    columns |= {column: [cell_of(own, column).replace(",", ";") for own in cuts.own] for column in own_columns(cuts)}
     columns["probability_stable"] = [f"{p:.6g}" for p in answers.stable]
     columns["covered"] = [str(each) for each in answers.covered]
     write_text(path, "\n".join([",".join(columns), *map(",".join, zip(*columns.values(), strict=True)), ""]))
@@ -164,10 +164,10 @@ def write_tests(path: str | Path, cuts: TestedCuts, answers: TestedAnswers) -> N
 
 def own_columns(cuts: TestedCuts) -> list[str]:
     """Return the columns of `OWN` in which any cut tells something of itself."""
-    return [column for column in OWN if any(told(own, column) for own in cuts.own)]
+    return [column for column in OWN if any(cell_of(own, column) for own in cuts.own)]
 
 
-def told(own: OwnConditions, column: str) -> str:
+def cell_of(own: OwnConditions, column: str) -> str:
     """Return the cell of a column of `OWN`, as `own_conditions` reads it."""
     if column in FURTHER:
         at = FURTHER.index(column)

@@ -94,5 +94,5 @@ def uncovered(points: FloatArray, asked: TestedCuts, process: MillingProcess, co
     told = np.array([each is Covered.NO for each in cover]) & np.isin(wanted, points[:, 2])
     if told.any():
         are, far = "is" if told.sum() == 1 else "are", counted(int(told.sum()), "cut")
-        said.append(f"{far} {are} far from every label: the probability is that of the learnt tip alone")
+        said.append(f"{far} {are} far from every label: the probability is extrapolated")
     return tuple(said)

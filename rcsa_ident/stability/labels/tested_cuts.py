@@ -185,22 +185,20 @@ class TestedCuts:
         told = []
         if self.verdict and len(set(self.verdict)) == 1 and self.verdict[0] is not Verdict.MARGINAL:
             side = "deeper" if self.verdict[0] is Verdict.STABLE else "less deep"
-            told.append(
-                f"every cut is labelled {self.verdict[0]}: the labels say that limits are {side} than the cuts, and not by how much"
-            )
+            told.append(f"every cut is labelled {self.verdict[0]}: limits are {side} than the cuts, by how much stays unknown")
         sessions = [own.session for own in self.own if own.session]
         alone = sum(sessions.count(each) == 1 for each in sessions)
         if alone:
-            told.append(f"{counted(alone, 'session')} of one cut: what a session adds is told from the cut by none of them")
+            told.append(f"{counted(alone, 'session')} of one cut: there the effect of the session cannot be separated from the cut")
         rows = [(*row[:2], replace(row[3], session="", further=())) for row in self._rows]
         groups = [{self.verdict[k] for k, row in enumerate(rows) if row == one} for one in dict.fromkeys(rows)]
         differing = sum({Verdict.STABLE, Verdict.CHATTER} <= each for each in groups)
         if differing:
-            told.append(f"{counted(differing, 'cut')} made again and judged differently: that is taken for noise of the labels")
+            told.append(f"{counted(differing, 'cut')} repeated with another verdict: this counts as label noise")
         directions = {own.strategy for own in self.own} - {""}
         if len(directions) == 1:
             (one,) = directions
-            told.append(f"all labels are of {one} milling: of the other direction they tell nothing")
+            told.append(f"all labels are of {one} milling: the other direction has no labels")
         return tuple(told)
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import log_expit
 
-from rcsa_ident.stability.labels.adaptive_importance import adaptive_importance, systematic
+from rcsa_ident.stability.labels.adaptive_importance import _gentle, adaptive_importance, systematic
 
 #: A Gaussian likelihood of eight unknowns, of which it tells four.
 CENTRE, PRECISION = np.array([1.0, -1.0, 0.5, 0, 0, 0, 0, 0]), np.array([9.0, 9.0, 4.0, 1.0, 0, 0, 0, 0])
@@ -79,3 +79,12 @@ def test_systematic_resampling_takes_each_as_often_as_its_share_says():
     weight = np.array([0.05, 0.5, 0.2, 0.25])
     count = np.bincount(systematic(weight, 40, np.random.default_rng(1)), minlength=4)
     assert np.all(np.abs(count - 40 * weight) <= 1)
+
+
+def test_weights_of_few_draws_are_raised_to_a_power_until_enough_count():
+    """Enough as they are: none is changed. Too few: as many as are asked for, in the same order."""
+    even, steep = np.full(40, 1.0 / 40.0), np.exp(-np.arange(40.0))
+    assert np.array_equal(_gentle(even, 16.0), even)
+    found = _gentle(steep / steep.sum(), 16.0)
+    assert 16.0 <= 1.0 / np.sum(found**2) < 24.0
+    assert np.all(np.diff(found) < 0.0)

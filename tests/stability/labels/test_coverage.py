@@ -22,7 +22,7 @@ def test_direction_edges_and_distance():
     assert found == (Covered.YES, Covered.PARTLY, Covered.NO, Covered.PARTLY, Covered.NO)
     assert uncovered(labels, asked, CUT, found) == (
         "no label was ever taken in down milling: the probability of 1 cut is what was believed before, or an even chance",
-        "1 cut is far from every label: the probability is that of the learnt tip alone",
+        "1 cut is far from every label: the probability is extrapolated",
     )
     assert uncovered(labels, cuts(("up", "new")), CUT, (Covered.YES,)) == ()
 

@@ -72,14 +72,14 @@ def test_what_labels_of_their_kind_cannot_teach():
     own = (OwnConditions(session="a", strategy="up"),) * 2
     cuts = TestedCuts(np.array([500.0, 600.0]), np.full(2, 1e-3), (Verdict.STABLE,) * 2, own=own)
     assert cuts.notes == (
-        "every cut is labelled stable: the labels say that limits are deeper than the cuts, and not by how much",
-        "all labels are of up milling: of the other direction they tell nothing",
+        "every cut is labelled stable: limits are deeper than the cuts, by how much stays unknown",
+        "all labels are of up milling: the other direction has no labels",
     )
     own = tuple(OwnConditions(session=each) for each in "aab")
     again = TestedCuts(np.full(3, 500.0), np.full(3, 1e-3), (Verdict.STABLE, Verdict.CHATTER, Verdict.CHATTER), own=own)
     assert again.notes == (
-        "1 session of one cut: what a session adds is told from the cut by none of them",
-        "1 cut made again and judged differently: that is taken for noise of the labels",
+        "1 session of one cut: there the effect of the session cannot be separated from the cut",
+        "1 cut repeated with another verdict: this counts as label noise",
     )
     assert TestedCuts.none().notes == ()
 
